@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: MIT */
+/** @file blw_l1.h  Secure fusion of local estimates: the l1-penalised least squares of [L] (31).
+ *
+ *  With zeta = G x + mu + nu, mu ~ N(0, W) benign and nu sparse, minimise over x, mu, nu
+ *      1/2 mu' W^-1 mu + sum_g c_g |nu_g|,                                                    (1)
+ *  g = groups of one row (real mode) or two (complex pair).  Reduced by Z' W Z = I, Z' G = 0 to
+ *      min over nu of  1/2 |Z' (zeta - nu)|^2 + sum_g c_g |nu_g|,                             (2)
+ *      l = Z Z' (zeta - nu),   x_hat = F (zeta - nu),                                         (3)
+ *  nu is optimal iff  |l_g| <= c_g  for all g and  l_g = c_g nu_g / |nu_g|  where nu_g /= 0.  (4)
+ *
+ *  Certificate: if (4) holds for nu = 0, then x_hat is exactly the Kalman estimate ([L] Theorem 3).
+ *  Two engines solve the rest.  Both keep tau = zeta - nu, not nu: tau stays at noise size however
+ *  large the attack, so nothing large cancels.
+ *
+ *  Z is lower trapezoidal, packed by rows: row i has min(i + 1, d) numbers.  Rows of a group are
+ *  adjacent and scaled so that a benign l_g has unit mean square per row.
+ */
+#ifndef BLW_L1_H
+#define BLW_L1_H
+#include "blw/blw_model.h"
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+typedef enum blw_l1_engine {
+    BLW_L1_ACTIVE_SET = 1, /**< pivots between supports; Newton steps where groups have two rows */
+    BLW_L1_ADMM       = 2  /**< alternating directions, then the same solve on the support found */
+} blw_l1_engine_t;
+
+typedef struct blw_l1_model {
+    uint16_t          N;              /**< rows of zeta */
+    uint16_t          d;              /**< columns of Z, N - n */
+    uint16_t          n_groups;       /**< groups */
+    uint16_t          max_iterations; /**< bound on pivots or passes in one solve */
+    uint8_t           n;              /**< states */
+    uint8_t           engine;         /**< blw_l1_engine_t */
+    const uint16_t   *first;          /**< [n_groups + 1] first row of each group, then N */
+    const blw_real_t *Z;              /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid */
+    const blw_real_t *F;              /**< [n x N] */
+    const blw_real_t *c;              /**< [n_groups] thresholds, > 0 */
+    const blw_real_t *M;              /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
+                                           NULL otherwise */
+    blw_real_t        rho;            /**< ADMM: penalty, > 0; 0 otherwise */
+    blw_real_t        kappa_G;        /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
+                                           least |x| / kappa_G */
+    blw_real_t        kappa_W;        /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
+} blw_l1_model_t;
+
+/** Solver state: the support found last, from which the next solve starts. */
+typedef struct blw_l1 {
+    const blw_l1_model_t *model;
+    blw_real_t           *tau;    /* [N] zeta - nu */
+    blw_real_t           *l;      /* [N] multipliers (3) */
+    blw_real_t           *z;      /* [d] Z' tau */
+    blw_real_t           *step;   /* [N] right-hand sides and steps of tau */
+    blw_real_t           *dz;     /* [d] Z' step */
+    blw_real_t           *R;      /* [d (d + 1) / 2] R' R = Z_A Z_A' (+ curvature), packed */
+    blw_real_t           *u;      /* [N] ADMM: scaled dual; NULL otherwise */
+    blw_real_t           *A;      /* [n_groups] groups in the support, in the order of R: small
+                                     integers, exact in blw_real_t */
+    uint16_t              n_A;    /* groups in A */
+} blw_l1_t;
+
+typedef struct blw_l1_info {
+    blw_real_t statistic;  /**< max_g |l_g| / c_g at nu = 0; the certificate holds iff it is <= 1 */
+    blw_real_t gap;        /**< duality gap of what is returned */
+    blw_real_t bound;      /**< on |x_hat - x*|_2: the last correction if (4) was verified, else
+                                from the gap, kappa_G and kappa_W */
+    uint16_t   iterations; /**< pivots or passes used */
+    bool       kalman;     /**< certificate: nu = 0 */
+    bool       converged;  /**< (4) was verified */
+} blw_l1_info_t;
+
+/** Length of Z: d rows that grow from 1 to d, then N - d full ones. */
+#define BLW_L1_Z_LEN(N, d) \
+    ((((size_t)(d) * ((size_t)(d) + 1U)) / 2U) + (((size_t)(N) - (size_t)(d)) * (size_t)(d)))
+
+/** Number of blw_real_t that init() needs, whatever the engine. */
+#define BLW_L1_MEM(N, d, n_groups) \
+    ((4U * (size_t)(N)) + (2U * (size_t)(d)) + (((size_t)(d) * ((size_t)(d) + 1U)) / 2U) \
+     + (size_t)(n_groups))
+
+/** Add the tables to a walk and check dimensions, groups, signs and the engine. */
+blw_status_t blw_l1_check(const blw_l1_model_t *model, blw_table_check_t *check);
+/** Bind a checked model and BLW_L1_MEM numbers of memory, reset. */
+void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem);
+/** Forget the support. */
+void blw_l1_reset(blw_l1_t *self);
+/** Solve (2) for zeta [N], finite, and write x_hat [n] of (3).  Cannot fail; a bound reached is in
+ *  *info and x_hat is then the best found.  BLW_L1_Z_LEN multiply-adds twice and N n if the
+ *  certificate holds; at most model->max_iterations pivots or passes otherwise. */
+void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw_l1_info_t *info);
+/** max over the groups with a row in first..first+count-1 of (|l_g| + |nu_g|) / c_g after a solve:
+ *  how far these rows are from being explained by noise; > 1 iff one of them is in the support. */
+blw_real_t blw_l1_excess(const blw_l1_t *self, const blw_real_t *zeta, size_t first, size_t count);
+#ifdef __cplusplus
+}
+#endif
+#endif
