@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file blw_estimator.h  One small interface over all methods.
  *
- *  A node or a simulator holds any method through a const table of functions; firmware that uses one
- *  method may call that method's own header instead, which does the same without the indirection.
+ *  A node or a simulator holds any method through a const table of functions; firmware that uses
+ *  one method may call its own header instead, which does the same without the indirection.
  *  The state of every method starts with a blw_estimator_t, so a pointer to it is a pointer to the
  *  state (MISRA C:2012 deviation D-1).  Reentrant: all that changes is in *self and its memory.
  */
@@ -15,7 +15,7 @@ extern "C" {
 
 /** How the estimate of one step came about. */
 typedef enum blw_outcome {
-    BLW_OUTCOME_KALMAN    = 0, /**< nothing suspicious: exactly the estimate of all usable samples */
+    BLW_OUTCOME_KALMAN    = 0, /**< nothing suspicious: exactly the estimate of all used samples */
     BLW_OUTCOME_CONVERGED = 1, /**< a secure estimate, computed to the end */
     BLW_OUTCOME_BOUND     = 2, /**< the bound on work was reached; see blw_estimator_out_t.bound */
     BLW_OUTCOME_HELD      = 3  /**< no hypothesis passed its test: the last choice was kept */
@@ -62,11 +62,12 @@ struct blw_estimator_ops {
     blw_status_t (*init)(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
                          size_t mem_len);
     /** Start again from x(0) = x0 [n]; NULL takes the model's x0.
-     *  @return BLW_OK, or BLW_ERR_ARG with nothing changed if x0 is not finite. */
+     *  @return BLW_OK, or BLW_ERR_ARG with nothing changed if x0 is not within BLW_SIGNAL_MAX. */
     blw_status_t (*reset)(blw_estimator_t *self, const blw_real_t *x0);
     /** Advance from k-1 to k with u(k-1) [l] (NULL means 0), y(k) [m] and the set of valid samples.
-     *  A sample that is not in valid, not finite or out of its range is missing.
-     *  @return BLW_OK; or BLW_ERR_ARG, BLW_ERR_INPUT (u not finite) with state and *out untouched. */
+     *  A sample that is not in valid, out of its range or beyond BLW_SIGNAL_MAX is missing.
+     *  @return BLW_OK; or BLW_ERR_ARG (also: valid names a sensor >= m) or BLW_ERR_INPUT (u is not
+     *  within BLW_SIGNAL_MAX) with state and *out untouched. */
     blw_status_t (*step)(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
                          blw_mask_t valid, blw_estimator_out_t *out);
 };

@@ -55,7 +55,7 @@ typedef struct blw_plant {
     const blw_real_t *offset; /**< [m] constant part of y */
     const blw_real_t *y_min;  /**< [m] a sample below is missing; may be -BLW_REAL_MAX */
     const blw_real_t *y_max;  /**< [m] a sample above is missing; > y_min */
-    const blw_real_t *x0;     /**< [n] x_hat(0) */
+    const blw_real_t *x0;     /**< [n] x_hat(0), within BLW_SIGNAL_MAX */
 } blw_plant_t;
 
 /** First member of the model of every method. */
@@ -87,11 +87,14 @@ blw_status_t blw_model_begin(const blw_model_t *model, blw_method_t method,
 /** End the walk: every table was sound and the sum is model->crc. */
 blw_status_t blw_model_end(const blw_model_t *model, const blw_table_check_t *check);
 
-/** u [l] is finite.  u may be NULL, which means 0. */
+/** u [l] is within BLW_SIGNAL_MAX.  u may be NULL, which means 0. */
 bool blw_plant_input_ok(const blw_plant_t *plant, const blw_real_t *u);
-/** The samples that can be used: those in valid that are finite and inside their range. */
+/** The samples that can be used: those in valid that are inside their range and, whatever the range
+ *  says, within BLW_SIGNAL_MAX. */
 blw_mask_t blw_plant_screen(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid);
-/** x_bar = A x + Bu u, [n].  u may be NULL.  x_bar must not be x.  n (n + l) multiply-adds. */
+/** x_bar = A x + Bu u, [n].  u may be NULL.  x_bar must not be x.  n (n + l) multiply-adds.
+ *  An x_bar beyond BLW_SIGNAL_MAX (an unstable plant predicted without samples for long) is
+ *  replaced by x0, so that the estimate recovers when samples come back. */
 void blw_plant_predict(const blw_plant_t *plant, const blw_real_t *x, const blw_real_t *u,
                        blw_real_t *x_bar);
 /** Replace samples that are not in valid by their prediction: out_i = y_i - offset_i or C_i x_bar.

@@ -5,6 +5,10 @@
  *  for everything that links it).  All code is written for round-to-nearest IEEE 754 arithmetic
  *  without contraction, so that every target computes the same bits; fast-math breaks that and the
  *  tests for NaN, so it is refused here.
+ *
+ *  BLW_SIGNAL_MAX is the largest magnitude of a sample, an input or a state that a step works with.
+ *  Its square, and sums of squares after gains far above 1, are still finite; what is larger is
+ *  treated like an infinity, so that no data overflow into a state.
  */
 #ifndef BLW_REAL_H
 #define BLW_REAL_H
@@ -22,11 +26,13 @@ typedef double blw_real_t;
 #define BLW_R(literal) literal
 #define BLW_REAL_MAX DBL_MAX
 #define BLW_REAL_EPS DBL_EPSILON
+#define BLW_SIGNAL_MAX 1e150
 #else
 typedef float blw_real_t;
 #define BLW_R(literal) literal##F
 #define BLW_REAL_MAX FLT_MAX
 #define BLW_REAL_EPS FLT_EPSILON
+#define BLW_SIGNAL_MAX 1e15F
 #endif
 
 #endif

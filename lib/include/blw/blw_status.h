@@ -8,7 +8,7 @@ typedef enum blw_status {
     BLW_ERR_ARG   = -1, /**< a pointer is NULL, or a size or mask is out of range */
     BLW_ERR_MODEL = -2, /**< a table is missing, not finite, inconsistent, or of another ABI */
     BLW_ERR_MEM   = -3, /**< the memory handed over is too small */
-    BLW_ERR_INPUT = -4  /**< a known input u is NaN or infinite */
+    BLW_ERR_INPUT = -4  /**< a known input u is NaN, infinite or beyond BLW_SIGNAL_MAX */
 } blw_status_t;
 
 #endif

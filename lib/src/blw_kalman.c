@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw/blw_kalman.h"
+#include "blw_la.h"
+#include "blw_step.h"
+
+static blw_status_t check_model(const blw_kalman_model_t *model)
+{
+    blw_table_check_t  check;
+    const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_KALMAN, &check);
+
+    if (status != BLW_OK) {
+        return status;
+    }
+    const blw_plant_t *const plant = model->head.plant;
+    blw_table_add(&check, model->K, (size_t)plant->n * plant->m);
+    return blw_model_end(&model->head, &check);
+}
+
+blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model, blw_real_t *mem,
+                             size_t mem_len)
+{
+    if ((self == NULL) || (model == NULL) || (mem == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_status_t status = check_model(model);
+    if (status != BLW_OK) {
+        return status;
+    }
+    const blw_plant_t *const plant = model->head.plant;
+    if (mem_len < BLW_KALMAN_MEM(plant->n, plant->m)) {
+        return BLW_ERR_MEM;
+    }
+    self->base.ops  = &blw_kalman_ops;
+    self->model     = model;
+    self->x_hat     = blw_la_take(&mem, plant->n);
+    self->x_bar     = blw_la_take(&mem, plant->n);
+    self->suspicion = blw_la_take(&mem, plant->m);
+    return blw_kalman_reset(self, NULL);
+}
+
+blw_status_t blw_kalman_reset(blw_kalman_t *self, const blw_real_t *x0)
+{
+    if (self == NULL) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant = self->model->head.plant;
+    const blw_real_t *const  start = (x0 != NULL) ? x0 : plant->x0;
+    if (!blw_la_bounded(plant->n, start)) {
+        return BLW_ERR_ARG;
+    }
+    blw_la_copy(plant->n, start, self->x_hat);
+    return BLW_OK;
+}
+
+/* (2) with the samples in used only; the suspicion of the others is 1. */
+static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
+{
+    const blw_plant_t *const plant = self->model->head.plant;
+    const size_t             n     = plant->n;
+    const size_t             m     = plant->m;
+
+    blw_la_copy(n, self->x_bar, self->x_hat);
+    blw_la_fill(m, BLW_R(1.0), self->suspicion);
+    for (size_t i = 0U; i < m; i++) {
+        if (((used >> i) & 1U) == 0U) {
+            continue;
+        }
+        const blw_real_t y_bar = blw_la_dot(n, &plant->C[i * n], self->x_bar);
+        const blw_real_t r     = (y[i] - plant->offset[i]) - y_bar;
+
+        for (size_t j = 0U; j < n; j++) {
+            self->x_hat[j] += self->model->K[(j * m) + i] * r;
+        }
+        self->suspicion[i] = BLW_R(0.0);
+    }
+}
+
+blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+    if (status != BLW_OK) {
+        return status;
+    }
+    blw_mask_t used = blw_plant_screen(plant, y, valid);
+
+    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
+    correct(self, y, used);
+    if (!blw_la_bounded(plant->n, self->x_hat)) {
+        used = 0U; /* the samples would overflow the state: predict instead */
+        correct(self, y, used);
+    }
+    *out = (blw_estimator_out_t){
+        .x_hat     = self->x_hat,
+        .suspicion = self->suspicion,
+        .used      = used,
+        .outcome   = (uint8_t)BLW_OUTCOME_KALMAN,
+        .flags     = blw_step_flags(plant, used, 0U),
+    };
+    return BLW_OK;
+}
+
+/* The four adapters rely on the base, and the head, being the first member (deviation D-1). */
+static size_t ops_mem_len(const blw_model_t *model)
+{
+    if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_KALMAN)
+        || (model->plant == NULL)) {
+        return 0U;
+    }
+    return BLW_KALMAN_MEM(model->plant->n, model->plant->m);
+}
+
+static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
+                             size_t mem_len)
+{
+    return blw_kalman_init((blw_kalman_t *)self, (const blw_kalman_model_t *)model, mem, mem_len);
+}
+
+static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+{
+    return blw_kalman_reset((blw_kalman_t *)self, x0);
+}
+
+static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    return blw_kalman_step((blw_kalman_t *)self, u, y, valid, out);
+}
+
+const blw_estimator_ops_t blw_kalman_ops = {
+    .method     = BLW_METHOD_KALMAN,
+    .state_size = sizeof(blw_kalman_t),
+    .mem_len    = ops_mem_len,
+    .init       = ops_init,
+    .reset      = ops_reset,
+    .step       = ops_step,
+};

@@ -1,0 +1,257 @@
+/* SPDX-License-Identifier: MIT */
+/* Secure fusion of local estimates: certificate, choice of engine, exit report.  See blw_l1.h for the
+ * problem and its equation numbers.  The gap at nu with multipliers l = Z z is, for any t in [0, 1]
+ * that makes t l feasible for the dual,
+ *     gap = sum_g (c_g |nu_g| - t l_g' nu_g) + (1 - t)^2 |z|^2 / 2,                          (5)
+ * and since (2) is strongly convex in z,  |z - z*| <= e = sqrt(2 gap).  The minimisers differ by
+ *     G (x* - x) = (nu - nu*) - W Z (z* - z)  with  sum_g c_g |nu*_g| <= f - (|z| - e)^2 / 2,
+ * so with the two constants of the model
+ *     |x* - x| <= kappa_G (sum_g c_g (|nu_g| + |nu*_g|) + kappa_W e).                        (6)
+ * (6) holds always and is coarse under a large attack; a verified optimum gives a sharp bound. */
+#include "blw_l1_internal.h"
+
+bool blw_l1_has_pairs(const blw_l1_model_t *m)
+{
+    return m->n_groups != m->N;
+}
+
+blw_real_t blw_l1_norm(const blw_l1_model_t *m, size_t g, const blw_real_t *v)
+{
+    const size_t i = m->first[g];
+
+    return (blw_l1_size(m, g) == 1U) ? blw_la_abs(v[i]) : blw_la_norm(2U, &v[i]);
+}
+
+blw_real_t blw_l1_nu_norm(const blw_l1_t *self, const blw_real_t *zeta, size_t g)
+{
+    const size_t i     = self->model->first[g];
+    blw_real_t   nu[2] = {zeta[i] - self->tau[i], BLW_R(0.0)};
+
+    if (blw_l1_size(self->model, g) == 1U) {
+        return blw_la_abs(nu[0]);
+    }
+    nu[1] = zeta[i + 1U] - self->tau[i + 1U];
+    return blw_la_norm(2U, nu);
+}
+
+blw_real_t blw_l1_aim(blw_l1_t *self, const blw_real_t *zeta, size_t g)
+{
+    const size_t     i    = self->model->first[g];
+    const size_t     size = blw_l1_size(self->model, g);
+    const blw_real_t norm = blw_l1_nu_norm(self, zeta, g);
+
+    for (size_t j = i; (norm > BLW_R(0.0)) && (j < (i + size)); j++) {
+        self->dir[j] = (zeta[j] - self->tau[j]) / norm;
+    }
+    return norm;
+}
+
+void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *out)
+{
+    blw_la_trapv_t(m->N, m->d, m->Z, v, out);
+}
+
+void blw_l1_multipliers(blw_l1_t *self)
+{
+    blw_la_trapv(self->model->N, self->model->d, self->model->Z, self->z, self->l);
+}
+
+blw_real_t blw_l1_statistic(const blw_l1_t *self)
+{
+    const blw_l1_model_t *const m   = self->model;
+    blw_real_t                  max = BLW_R(0.0);
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const blw_real_t ratio = blw_l1_norm(m, g, self->l) / m->c[g];
+        if (!(ratio <= BLW_REAL_MAX)) {
+            return ratio; /* a NaN must not pass for 0 */
+        }
+        max = blw_la_max(max, ratio);
+    }
+    return max;
+}
+
+bool blw_l1_in_support(const blw_l1_t *self, size_t g)
+{
+    bool found = false;
+
+    for (size_t k = 0U; (k < self->n_A) && !found; k++) {
+        found = (blw_l1_member(self, k) == g);
+    }
+    return found;
+}
+
+size_t blw_l1_worst(const blw_l1_t *self)
+{
+    const blw_l1_model_t *const m     = self->model;
+    const blw_real_t            z     = blw_la_norm(m->d, self->z);
+    blw_real_t                  worst = BLW_R(1.0);
+    size_t                      found = m->n_groups;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const blw_real_t limit = m->c[g] + (BLW_L1_SLACK * (m->c[g] + z));
+        const blw_real_t ratio = blw_l1_norm(m, g, self->l) / limit;
+        if ((ratio > worst) && !blw_l1_in_support(self, g)) {
+            worst = ratio;
+            found = g;
+        }
+    }
+    return found;
+}
+
+/* The gap (5) and the bound (6). */
+static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m   = self->model;
+    const blw_real_t            z   = blw_la_norm(m->d, self->z);
+    const blw_real_t            t   = BLW_R(1.0) / blw_la_max(BLW_R(1.0), blw_l1_statistic(self));
+    blw_real_t                  sum = BLW_R(0.0); /* sum_g c_g |nu_g| */
+    blw_real_t                  gap = BLW_R(0.5) * (BLW_R(1.0) - t) * (BLW_R(1.0) - t) * z * z;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const blw_real_t penalty = m->c[g] * blw_l1_nu_norm(self, zeta, g);
+        sum += penalty;
+        gap += penalty;
+        for (size_t i = m->first[g]; i < m->first[g + 1U]; i++) {
+            gap -= t * self->l[i] * (zeta[i] - self->tau[i]);
+        }
+    }
+    info->gap = blw_la_max(gap, BLW_R(0.0));
+    const blw_real_t e       = blw_la_sqrt(BLW_R(2.0) * info->gap);
+    const blw_real_t z_least = blw_la_max(z - e, BLW_R(0.0));
+    const blw_real_t best    = sum + (BLW_R(0.5) * ((z * z) - (z_least * z_least)));
+    info->bound              = m->kappa_G * (sum + best + (m->kappa_W * e));
+}
+
+/* Take tau on A from the last solve: nu then absorbs what changed, and a group whose nu has turned
+ * round or vanished is no candidate any more. */
+static void warm_start(blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m = self->model;
+    size_t                      k = 0U;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        for (size_t i = m->first[g]; (i < m->first[g + 1U]) && !blw_l1_in_support(self, g); i++) {
+            self->tau[i] = zeta[i];
+        }
+    }
+    while (k < self->n_A) {
+        const size_t     g    = blw_l1_member(self, k);
+        const size_t     i    = m->first[g];
+        const blw_real_t nu   = zeta[i] - self->tau[i];
+        const bool       pair = (blw_l1_size(m, g) == 2U);
+        if ((pair && (blw_l1_aim(self, zeta, g) > BLW_R(0.0)))
+            || (!pair && ((nu * self->dir[i]) > BLW_R(0.0)))) {
+            k++;
+        } else {
+            blw_l1_support_drop(self, zeta, k);
+        }
+    }
+    blw_l1_project(m, self->tau, self->z);
+}
+
+void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
+{
+    const size_t N = model->N;
+    const size_t d = model->d;
+
+    self->model = model;
+    self->tau   = mem;
+    self->l     = &self->tau[N];
+    self->dir   = &self->l[N];
+    self->step  = &self->dir[N];
+    self->z     = &self->step[N];
+    self->dz    = &self->z[d];
+    self->A     = &self->dz[d];
+    self->L     = &self->A[model->n_groups];
+    blw_l1_reset(self);
+}
+
+void blw_l1_reset(blw_l1_t *self)
+{
+    blw_la_fill(self->model->N, BLW_R(0.0), self->tau);
+    blw_la_fill(self->model->N, BLW_R(0.0), self->dir);
+    self->n_A  = 0U;
+    self->rows = 0U;
+}
+
+void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    *info = (blw_l1_info_t){.kalman = false};
+    blw_l1_project(m, zeta, self->z);
+    blw_l1_multipliers(self);
+    info->statistic = blw_l1_statistic(self);
+    if (info->statistic <= BLW_R(1.0)) {
+        info->kalman    = true;
+        info->converged = true;
+        blw_l1_support_clear(self, zeta);
+    } else if (m->engine == (uint8_t)BLW_L1_ADMM) {
+        blw_l1_admm(self, zeta, info);
+    } else {
+        warm_start(self, zeta);
+        blw_l1_active_set(self, zeta, info);
+    }
+    if (!info->converged) {
+        report_gap(self, zeta, info);
+    }
+    blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
+}
+
+blw_real_t blw_l1_excess(const blw_l1_t *self, const blw_real_t *zeta, size_t first, size_t count)
+{
+    const blw_l1_model_t *const m   = self->model;
+    blw_real_t                  max = BLW_R(0.0);
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        if ((m->first[g] >= first) && (m->first[g] < (first + count))) {
+            const blw_real_t h = blw_l1_norm(m, g, self->l) + blw_l1_nu_norm(self, zeta, g);
+            max                = blw_la_max(max, h / m->c[g]);
+        }
+    }
+    return max;
+}
+
+/* Groups of one or two rows that cover 0..N-1 in order. */
+static bool groups_ok(const blw_l1_model_t *m)
+{
+    bool ok = (m->first != NULL) && (m->n_groups >= 1U) && (m->first[0] == 0U);
+
+    for (size_t g = 0U; ok && (g < m->n_groups); g++) {
+        ok = (m->first[g + 1U] > m->first[g]) && (blw_l1_size(m, g) <= 2U);
+    }
+    return ok && (m->first[m->n_groups] == m->N);
+}
+
+/* Thresholds and constants are positive; the engine has what it needs. */
+static bool numbers_ok(const blw_l1_model_t *m)
+{
+    const bool admm = (m->engine == (uint8_t)BLW_L1_ADMM);
+    bool       ok   = (m->kappa_G > BLW_R(0.0)) && (m->kappa_W > BLW_R(0.0))
+              && (admm ? (m->rho > BLW_R(0.0)) : (m->engine == (uint8_t)BLW_L1_ACTIVE_SET));
+
+    for (size_t g = 0U; ok && (g < m->n_groups); g++) {
+        ok = (m->c[g] > BLW_R(0.0));
+    }
+    return ok;
+}
+
+blw_status_t blw_l1_check(const blw_l1_model_t *m, blw_table_check_t *check)
+{
+    if ((m == NULL) || (m->d == 0U) || (m->N != (m->d + m->n)) || !groups_ok(m)
+        || (m->max_iterations == 0U)) {
+        return BLW_ERR_MODEL;
+    }
+    const size_t N    = m->N;
+    const bool   admm = (m->engine == (uint8_t)BLW_L1_ADMM);
+
+    blw_table_add(check, m->Z, BLW_L1_Z_LEN(N, m->d));
+    blw_table_add(check, m->F, (size_t)m->n * N);
+    blw_table_add(check, m->c, m->n_groups);
+    blw_table_add(check, m->M, admm ? ((N * (N + 1U)) / 2U) : 0U);
+    blw_table_add_real(check, m->rho);
+    blw_table_add_real(check, m->kappa_G);
+    blw_table_add_real(check, m->kappa_W);
+    return (check->ok && numbers_ok(m)) ? BLW_OK : BLW_ERR_MODEL;
+}

@@ -1,0 +1,226 @@
+/* SPDX-License-Identifier: MIT */
+/* Active-set engine for (2) in blw_l1.h.  Every pass takes a Newton step on the support A, exact if
+ * all groups have one row, and then changes A by one group: the first whose nu vanishes on the way
+ * leaves, or, once the residual on A is small, the one that violates |l_g| <= c_g most enters.  The
+ * objective never rises; the end is verified with z and l formed anew from tau. */
+#include "blw_l1_internal.h"
+
+/* Residual on A, relative to c_g + |z|, below which a group may enter, and at the end. */
+#define RESIDUAL_ENTER BLW_R(1e-4)
+#define RESIDUAL_FINAL (BLW_R(4.0) * BLW_L1_SLACK)
+
+/* Halvings of the bracket in the search along a step, pairs only. */
+#define BISECTIONS 40U
+
+/* What a pass did. */
+typedef struct pass {
+    blw_real_t alpha;   /* fraction of the Newton step taken */
+    size_t     blocked; /* member of A whose nu vanished, or n_A */
+} pass_t;
+
+/* Largest alpha <= 1 that keeps the sign of nu on every group of one row. */
+static pass_t first_crossing(const blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m    = self->model;
+    pass_t                      pass = {BLW_R(1.0), self->n_A};
+    size_t                      r    = 0U;
+
+    for (size_t k = 0U; k < self->n_A; k++) {
+        const size_t     g    = blw_l1_member(self, k);
+        const size_t     i    = m->first[g];
+        const blw_real_t nu   = (zeta[i] - self->tau[i]) * self->dir[i];
+        const blw_real_t loss = self->step[r] * self->dir[i];
+        if ((blw_l1_size(m, g) == 1U) && ((pass.alpha * loss) > nu)) {
+            pass.alpha   = blw_la_max(nu, BLW_R(0.0)) / loss;
+            pass.blocked = k;
+        }
+        r += blw_l1_size(m, g);
+    }
+    return pass;
+}
+
+/* Slope of the objective along the step at alpha. */
+static blw_real_t slope(const blw_l1_t *self, const blw_real_t *zeta, blw_real_t alpha)
+{
+    const blw_l1_model_t *const m   = self->model;
+    size_t                      r   = 0U;
+    blw_real_t                  sum = blw_la_dot(m->d, self->z, self->dz)
+                     + (alpha * blw_la_dot(m->d, self->dz, self->dz));
+
+    for (size_t k = 0U; k < self->n_A; k++) {
+        const size_t g     = blw_l1_member(self, k);
+        const size_t i     = m->first[g];
+        const size_t size  = blw_l1_size(m, g);
+        blw_real_t   nu[2] = {BLW_R(0.0), BLW_R(0.0)};
+        blw_real_t   dot   = BLW_R(0.0);
+        for (size_t j = 0U; j < size; j++) {
+            nu[j] = (zeta[i + j] - self->tau[i + j]) - (alpha * self->step[r + j]);
+            dot -= nu[j] * self->step[r + j];
+        }
+        const blw_real_t norm = blw_la_norm(2U, nu);
+        if (norm > BLW_R(0.0)) {
+            sum += (m->c[g] * dot) / norm;
+        }
+        r += size;
+    }
+    return sum;
+}
+
+/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic. */
+static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
+{
+    blw_real_t low  = BLW_R(0.0);
+    blw_real_t high = pass->alpha;
+
+    if (slope(self, zeta, high) <= BLW_R(0.0)) {
+        return;
+    }
+    pass->blocked = self->n_A;
+    for (size_t h = 0U; (h < BISECTIONS) && ((low * BLW_R(1.25)) < high); h++) {
+        const blw_real_t middle = BLW_R(0.5) * (low + high);
+        if (slope(self, zeta, middle) > BLW_R(0.0)) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    pass->alpha = (low > BLW_R(0.0)) ? low : high;
+}
+
+/* Drop every pair for which nu_g = 0 is the best with all others fixed: |l_g + Z_g Z_g' nu_g| <= c. */
+static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m       = self->model;
+    bool                        dropped = false;
+    size_t                      k       = 0U;
+
+    while (k < self->n_A) {
+        const size_t g    = blw_l1_member(self, k);
+        const size_t i    = m->first[g];
+        bool         drop = false;
+        if (blw_l1_size(m, g) == 2U) {
+            size_t                  len[2];
+            const blw_real_t *const row[2] = {blw_l1_row(m, i, &len[0]), blw_l1_row(m, i + 1U, &len[1])};
+            const blw_real_t        nu[2]  = {zeta[i] - self->tau[i], zeta[i + 1U] - self->tau[i + 1U]};
+            const blw_real_t        S01    = blw_la_dot(len[0], row[0], row[1]);
+            const blw_real_t        l[2]   = {
+                self->l[i] + (blw_la_dot(len[0], row[0], row[0]) * nu[0]) + (S01 * nu[1]),
+                self->l[i + 1U] + (S01 * nu[0]) + (blw_la_dot(len[1], row[1], row[1]) * nu[1])};
+            drop = (blw_la_norm(2U, l) <= m->c[g]);
+        }
+        if (drop) {
+            blw_l1_support_drop(self, zeta, k);
+            blw_l1_multipliers(self);
+            dropped = true;
+        } else {
+            k++;
+        }
+    }
+    return dropped;
+}
+
+/* Put g into A with a first nu_g: 0+ for one row, a safe step along l_g for a pair. */
+static void enter(blw_l1_t *self, size_t g)
+{
+    const blw_l1_model_t *const m    = self->model;
+    const size_t                i    = m->first[g];
+    const size_t                size = blw_l1_size(m, g);
+    const blw_real_t            norm = blw_l1_norm(m, g, self->l);
+
+    for (size_t j = i; j < (i + size); j++) {
+        self->dir[j] = self->l[j] / norm;
+        if (size == 2U) {
+            /* curvature along l_g is at most the trace of Z_g Z_g', 2 by the scaling of Z */
+            const blw_real_t        nu = BLW_R(0.5) * (norm - m->c[g]) * self->dir[j];
+            size_t                  len;
+            const blw_real_t *const row = blw_l1_row(m, j, &len);
+            self->tau[j] -= nu;
+            blw_la_axpy(len, -nu, row, self->z);
+        }
+    }
+    blw_l1_support_add(self, g);
+}
+
+/* One Newton step on A as far as it descends, and the group that it takes out. */
+static pass_t descend(blw_l1_t *self, const blw_real_t *zeta)
+{
+    const bool pairs = blw_l1_has_pairs(self->model);
+
+    if (pairs) {
+        for (size_t k = 0U; k < self->n_A; k++) {
+            const size_t g = blw_l1_member(self, k);
+            if (blw_l1_size(self->model, g) == 2U) {
+                (void)blw_l1_aim(self, zeta, g);
+            }
+        }
+        blw_l1_multipliers(self);
+        blw_l1_support_factor(self, zeta);
+    }
+    blw_l1_support_newton(self);
+    pass_t pass = first_crossing(self, zeta);
+    if (pairs) {
+        search(self, zeta, &pass);
+    }
+    blw_l1_support_move(self, pass.alpha);
+    return pass;
+}
+
+/* (4) with z and l formed anew from tau, after one last correction, whose effect on x_hat becomes
+ * the error bound. */
+static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *bound)
+{
+    blw_l1_project(self->model, self->tau, self->z);
+    blw_l1_multipliers(self);
+    const pass_t pass = descend(self, zeta);
+    *bound            = blw_l1_support_effect(self);
+    blw_l1_multipliers(self);
+    return (pass.blocked == self->n_A) && (blw_l1_worst(self) == self->model->n_groups);
+}
+
+/* Whether the support is right and the residual on it as small as it gets: below the last slack, or
+ * no longer halved by a pass that left A as it was. */
+static bool settled(const blw_l1_t *self, blw_real_t residual, blw_real_t before)
+{
+    return ((residual <= RESIDUAL_FINAL) || ((residual * BLW_R(2.0)) > before))
+           && (blw_l1_worst(self) == self->model->n_groups);
+}
+
+/* Let the worst group into A if the residual there allows it.  @return the group or n_groups. */
+static size_t admit(blw_l1_t *self, blw_real_t residual)
+{
+    size_t g = self->model->n_groups;
+
+    if (residual <= RESIDUAL_ENTER) {
+        g = blw_l1_worst(self);
+    }
+    if (g < self->model->n_groups) {
+        enter(self, g);
+    }
+    return g;
+}
+
+void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
+{
+    const size_t none   = self->model->n_groups;
+    blw_real_t   before = BLW_REAL_MAX;
+
+    blw_l1_multipliers(self);
+    while (!info->converged && (info->iterations < self->model->max_iterations)) {
+        const blw_real_t residual = blw_l1_support_residual(self);
+        const size_t     n_A      = self->n_A;
+        info->iterations++;
+        if (settled(self, residual, before)) {
+            info->converged = verify(self, zeta, &info->bound);
+            before          = BLW_REAL_MAX;
+            continue;
+        }
+        const size_t entered = admit(self, residual);
+        const pass_t pass    = descend(self, zeta);
+        if (pass.blocked < self->n_A) {
+            blw_l1_support_drop(self, zeta, pass.blocked);
+        }
+        blw_l1_multipliers(self);
+        const bool dropped = blw_l1_has_pairs(self->model) && drop_pairs(self, zeta);
+        before = ((entered == none) && !dropped && (n_A == self->n_A)) ? residual : BLW_REAL_MAX;
+    }
+}

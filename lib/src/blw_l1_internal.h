@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: MIT */
+/** @file blw_l1_internal.h  What the parts of the l1 fusion share; not installed. */
+#ifndef BLW_L1_INTERNAL_H
+#define BLW_L1_INTERNAL_H
+#include "blw/blw_l1.h"
+#include "blw_la.h"
+
+/* Slack of the tests on (4), relative to c_g + |z|: what rounding leaves of l = Z z. */
+#define BLW_L1_SLACK (BLW_R(64.0) * BLW_REAL_EPS)
+
+/* Row i of the trapezoid Z and its length. */
+static inline const blw_real_t *blw_l1_row(const blw_l1_model_t *m, size_t i, size_t *len)
+{
+    *len = (i < m->d) ? (i + 1U) : m->d;
+    return &m->Z[blw_la_trap_row(m->d, i)];
+}
+
+/* Rows of group g: 1 or 2. */
+static inline size_t blw_l1_size(const blw_l1_model_t *m, size_t g)
+{
+    return (size_t)m->first[g + 1U] - (size_t)m->first[g];
+}
+
+/* k-th group of the support. */
+static inline size_t blw_l1_member(const blw_l1_t *self, size_t k)
+{
+    return (size_t)self->A[k];
+}
+
+/* |v_g| of a vector [N] of rows. */
+blw_real_t blw_l1_norm(const blw_l1_model_t *m, size_t g, const blw_real_t *v);
+/* |nu_g|, nu = zeta - tau. */
+blw_real_t blw_l1_nu_norm(const blw_l1_t *self, const blw_real_t *zeta, size_t g);
+/* Direction and length of nu_g = zeta_g - tau_g: dir_g = nu_g / |nu_g|, unchanged if nu_g = 0. */
+blw_real_t blw_l1_aim(blw_l1_t *self, const blw_real_t *zeta, size_t g);
+/* out = Z' v, [d]. */
+void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *out);
+/* l = Z z, all rows. */
+void blw_l1_multipliers(blw_l1_t *self);
+/* max_g |l_g| / c_g over all groups. */
+blw_real_t blw_l1_statistic(const blw_l1_t *self);
+/* The group outside A that violates |l_g| <= c_g most, or n_groups if none does. */
+size_t blw_l1_worst(const blw_l1_t *self);
+/* Whether g is in A. */
+bool blw_l1_in_support(const blw_l1_t *self, size_t g);
+
+/* Support: A, tau on A, and L with L L' = Z_A Z_A' + curvature (blw_l1_support.c). */
+
+/* Whether any group has two rows: then L has curvature and is made anew for every step. */
+bool blw_l1_has_pairs(const blw_l1_model_t *m);
+/* Empty A; tau = zeta. */
+void blw_l1_support_clear(blw_l1_t *self, const blw_real_t *zeta);
+/* Append g to A; dir_g is set.  One-row groups extend L. */
+void blw_l1_support_add(blw_l1_t *self, size_t g);
+/* Take member k out of A and set nu_g = 0; z follows tau.  One-row groups shrink L. */
+void blw_l1_support_drop(blw_l1_t *self, const blw_real_t *zeta, size_t k);
+/* Make L from scratch for A, dir and nu. */
+void blw_l1_support_factor(blw_l1_t *self, const blw_real_t *zeta);
+/* Newton step for (2) on A: L L' step = c dir - l, dz = Z_A' step. */
+void blw_l1_support_newton(blw_l1_t *self);
+/* tau_A += alpha step, z += alpha dz. */
+void blw_l1_support_move(blw_l1_t *self, blw_real_t alpha);
+/* |F_A step|_2: what step changes in x_hat. */
+blw_real_t blw_l1_support_effect(const blw_l1_t *self);
+/* max over A of |l_g - c_g dir_g| / (c_g + |z|). */
+blw_real_t blw_l1_support_residual(const blw_l1_t *self);
+
+/* Engines: start from A, dir and tau, leave the best tau found. */
+void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);
+void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);
+
+#endif

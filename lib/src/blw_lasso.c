@@ -1,0 +1,239 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw/blw_lasso.h"
+#include "blw_la.h"
+#include "blw_step.h"
+
+/* Method and P belong together: without P the states are fused as they are. */
+static bool method_ok(const blw_lasso_model_t *model)
+{
+    const uint8_t expected = (uint8_t)((model->P == NULL) ? BLW_METHOD_LASSO
+                                                          : BLW_METHOD_CANONICAL);
+
+    return model->head.method == expected;
+}
+
+static bool sizes_ok(const blw_lasso_model_t *model)
+{
+    const blw_plant_t *const plant = model->head.plant;
+
+    return (model->l1->n == plant->n)
+        && (model->l1->N == ((size_t)model->jordan->r * model->jordan->m))
+        && (model->ambiguous <= 1U);
+}
+
+static blw_status_t check_model(const blw_lasso_model_t *model)
+{
+    blw_table_check_t check;
+    blw_status_t      status = BLW_ERR_MODEL;
+
+    if (method_ok(model) && (model->jordan != NULL) && (model->l1 != NULL)) {
+        status = blw_model_begin(&model->head, (blw_method_t)model->head.method, &check);
+    }
+    if (status == BLW_OK) {
+        status = blw_jordan_check(model->jordan, model->head.plant, &check);
+    }
+    if (status == BLW_OK) {
+        status = blw_l1_check(model->l1, &check);
+    }
+    if (status != BLW_OK) {
+        return status;
+    }
+    if (!sizes_ok(model)) {
+        return BLW_ERR_MODEL;
+    }
+    if (model->P != NULL) {
+        blw_table_add(&check, model->P, (size_t)model->l1->N * model->jordan->r);
+    }
+    return blw_model_end(&model->head, &check);
+}
+
+static size_t mem_len_of(const blw_lasso_model_t *model)
+{
+    const blw_plant_t *const    plant = model->head.plant;
+    const blw_l1_model_t *const l1    = model->l1;
+
+    return BLW_LASSO_MEM(plant->n, plant->m, l1->N, l1->d, l1->n_groups,
+                         (model->P != NULL) ? 1U : 0U);
+}
+
+blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, blw_real_t *mem,
+                            size_t mem_len)
+{
+    if ((self == NULL) || (model == NULL) || (mem == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_status_t status = check_model(model);
+    if (status != BLW_OK) {
+        return status;
+    }
+    if (mem_len < mem_len_of(model)) {
+        return BLW_ERR_MEM;
+    }
+    const blw_plant_t *const    plant = model->head.plant;
+    const blw_l1_model_t *const l1    = model->l1;
+    self->base.ops  = &blw_lasso_ops;
+    self->model     = model;
+    self->zeta      = blw_la_take(&mem, l1->N);
+    self->xi        = (model->P != NULL) ? blw_la_take(&mem, l1->N) : self->zeta;
+    self->x_hat     = blw_la_take(&mem, plant->n);
+    self->x_bar     = blw_la_take(&mem, plant->n);
+    self->y         = blw_la_take(&mem, plant->m);
+    self->suspicion = blw_la_take(&mem, plant->m);
+    blw_l1_init(&self->l1, l1, mem);
+    return blw_lasso_reset(self, NULL);
+}
+
+blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0)
+{
+    if (self == NULL) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant = self->model->head.plant;
+    const blw_real_t *const  start = (x0 != NULL) ? x0 : plant->x0;
+    if (!blw_la_bounded(plant->n, start)) {
+        return BLW_ERR_ARG;
+    }
+    blw_la_copy(plant->n, start, self->x_hat);
+    blw_jordan_reset(self->model->jordan, plant->n, start, self->zeta);
+    blw_l1_reset(&self->l1);
+    return BLW_OK;
+}
+
+/* xi_i = P_i zeta_i.  @return whether both can be worked with. */
+static bool transform_sensor(blw_lasso_t *self, size_t i)
+{
+    const size_t      r      = self->model->jordan->r;
+    blw_real_t *const zeta_i = &self->zeta[i * r];
+    blw_real_t *const xi_i   = &self->xi[i * r];
+
+    if (self->model->P != NULL) {
+        blw_la_gemv(r, r, &self->model->P[i * r * r], zeta_i, xi_i);
+    }
+    return blw_la_bounded(r, zeta_i) && blw_la_bounded(r, xi_i);
+}
+
+/* All local filters to step k.  A filter that a sample throws out of bounds starts again from the
+ * prediction, and the sample counts as missing: zeta = G x without noise, and the filter forgets
+ * its start.  @return the samples that were taken in. */
+static blw_mask_t advance_filters(blw_lasso_t *self, const blw_real_t *u, blw_mask_t used)
+{
+    const blw_jordan_model_t *const jordan = self->model->jordan;
+    const size_t                    r      = jordan->r;
+    const size_t                    n      = self->model->head.plant->n;
+    blw_mask_t                      taken  = used;
+
+    blw_jordan_step(jordan, u, self->y, self->zeta);
+    for (size_t i = 0U; i < jordan->m; i++) {
+        if (!transform_sensor(self, i)) {
+            blw_la_gemv(r, n, &jordan->G[i * r * n], self->x_bar, &self->zeta[i * r]);
+            (void)transform_sensor(self, i);
+            taken &= ~((blw_mask_t)1U << i);
+        }
+    }
+    return taken;
+}
+
+static void judge_sensors(blw_lasso_t *self, blw_mask_t used)
+{
+    const size_t r = self->model->jordan->r;
+
+    for (size_t i = 0U; i < self->model->jordan->m; i++) {
+        const bool missing = ((used >> i) & 1U) == 0U;
+
+        self->suspicion[i] =
+            missing ? BLW_R(1.0)
+                    : blw_step_suspicion(blw_l1_excess(&self->l1, self->xi, i * r, r));
+    }
+}
+
+static blw_outcome_t outcome_of(const blw_l1_info_t *info)
+{
+    if (info->kalman) {
+        return BLW_OUTCOME_KALMAN;
+    }
+    return info->converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND;
+}
+
+static void report(const blw_lasso_t *self, const blw_l1_info_t *info, blw_mask_t used,
+                   blw_estimator_out_t *out)
+{
+    *out = (blw_estimator_out_t){
+        .x_hat      = self->x_hat,
+        .suspicion  = self->suspicion,
+        .statistic  = info->statistic,
+        .threshold  = BLW_R(1.0),
+        .bound      = info->bound,
+        .used       = used,
+        .iterations = info->iterations,
+        .outcome    = (uint8_t)outcome_of(info),
+        .flags      = blw_step_flags(self->model->head.plant, used, 0U),
+    };
+    if ((self->model->ambiguous != 0U) && !info->kalman) {
+        out->flags = (uint8_t)(out->flags | BLW_FLAG_AMBIGUOUS);
+    }
+}
+
+blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_real_t *y,
+                            blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+    if (status != BLW_OK) {
+        return status;
+    }
+    blw_l1_info_t info;
+    blw_mask_t    used = blw_plant_screen(plant, y, valid);
+
+    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
+    blw_plant_fill(plant, y, used, self->x_bar, self->y);
+    used = advance_filters(self, u, used);
+    blw_l1_solve(&self->l1, self->xi, self->x_hat, &info);
+    if (!blw_la_bounded(plant->n, self->x_hat)) {
+        blw_la_copy(plant->n, self->x_bar, self->x_hat); /* overflow in the fusion: predict */
+        used = 0U;
+    }
+    judge_sensors(self, used);
+    report(self, &info, used, out);
+    return BLW_OK;
+}
+
+static size_t ops_mem_len(const blw_model_t *model)
+{
+    const blw_lasso_model_t *const lasso = (const blw_lasso_model_t *)model;
+
+    if ((model == NULL) || (model->plant == NULL)
+        || ((model->method != (uint8_t)BLW_METHOD_LASSO)
+            && (model->method != (uint8_t)BLW_METHOD_CANONICAL))) {
+        return 0U;
+    }
+    return (lasso->l1 != NULL) ? mem_len_of(lasso) : 0U;
+}
+
+static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
+                             size_t mem_len)
+{
+    return blw_lasso_init((blw_lasso_t *)self, (const blw_lasso_model_t *)model, mem, mem_len);
+}
+
+static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+{
+    return blw_lasso_reset((blw_lasso_t *)self, x0);
+}
+
+static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    return blw_lasso_step((blw_lasso_t *)self, u, y, valid, out);
+}
+
+const blw_estimator_ops_t blw_lasso_ops = {
+    .method     = BLW_METHOD_LASSO,
+    .state_size = sizeof(blw_lasso_t),
+    .mem_len    = ops_mem_len,
+    .init       = ops_init,
+    .reset      = ops_reset,
+    .step       = ops_step,
+};

@@ -1,0 +1,158 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw/blw_model.h"
+#include <string.h>
+#include "blw_la.h"
+
+#ifdef BLW_REAL_DOUBLE
+typedef uint64_t real_bits_t;
+#else
+typedef uint32_t real_bits_t;
+#endif
+
+/* CRC-32 of IEEE 802.3 (zlib), reflected polynomial 0xEDB88320, four bits at a time: init only, so
+ * 64 bytes of table are the better bargain. */
+static const uint32_t crc_nibble[16] = {
+    0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U,
+    0x4DB26158U, 0x5005713CU, 0xEDB88320U, 0xF00F9344U, 0xD6D6A3E8U, 0xCB61B38CU,
+    0x9B64C2B0U, 0x86D3D2D4U, 0xA00AE278U, 0xBDBDF21CU,
+};
+
+/* Takes the number byte by byte from the low end, so that the sum is the same on every target. */
+static uint32_t crc_real(uint32_t crc, blw_real_t value)
+{
+    real_bits_t bits;
+
+    memcpy(&bits, &value, sizeof bits);
+    crc = ~crc;
+    for (size_t nibble = 0U; nibble < (2U * sizeof bits); nibble++) {
+        crc = (crc >> 4) ^ crc_nibble[(crc ^ (uint32_t)bits) & 0xFU];
+        bits >>= 4;
+    }
+    return ~crc;
+}
+
+void blw_table_begin(blw_table_check_t *check)
+{
+    check->crc = 0U;
+    check->ok  = true;
+}
+
+void blw_table_add(blw_table_check_t *check, const blw_real_t *table, size_t len)
+{
+    if (len == 0U) {
+        return;
+    }
+    if ((table == NULL) || !blw_la_finite(len, table)) {
+        check->ok = false;
+        return;
+    }
+    for (size_t i = 0U; i < len; i++) {
+        check->crc = crc_real(check->crc, table[i]);
+    }
+}
+
+void blw_table_add_real(blw_table_check_t *check, blw_real_t value)
+{
+    blw_table_add(check, &value, 1U);
+}
+
+static bool sizes_ok(const blw_plant_t *plant)
+{
+    return (plant->n >= 1U) && (plant->m >= 1U) && (plant->m <= BLW_MAX_SENSORS)
+        && (plant->p < plant->m);
+}
+
+static bool ranges_ok(const blw_plant_t *plant)
+{
+    for (size_t i = 0U; i < plant->m; i++) {
+        if (!(plant->y_min[i] < plant->y_max[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+blw_status_t blw_model_begin(const blw_model_t *model, blw_method_t method,
+                             blw_table_check_t *check)
+{
+    if ((model == NULL) || (check == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant = model->plant;
+    if ((model->abi != BLW_MODEL_ABI) || (model->method != (uint8_t)method) || (plant == NULL)
+        || !sizes_ok(plant)) {
+        return BLW_ERR_MODEL;
+    }
+    const size_t n = plant->n;
+    const size_t m = plant->m;
+    blw_table_begin(check);
+    blw_table_add(check, plant->A, n * n);
+    blw_table_add(check, plant->Bu, n * plant->l);
+    blw_table_add(check, plant->C, m * n);
+    blw_table_add(check, plant->offset, m);
+    blw_table_add(check, plant->y_min, m);
+    blw_table_add(check, plant->y_max, m);
+    blw_table_add(check, plant->x0, n);
+    if (!check->ok || !ranges_ok(plant) || !blw_la_bounded(n, plant->x0)) {
+        return BLW_ERR_MODEL;
+    }
+    return BLW_OK;
+}
+
+blw_status_t blw_model_end(const blw_model_t *model, const blw_table_check_t *check)
+{
+    return (check->ok && (check->crc == model->crc)) ? BLW_OK : BLW_ERR_MODEL;
+}
+
+bool blw_plant_input_ok(const blw_plant_t *plant, const blw_real_t *u)
+{
+    return (u == NULL) || blw_la_bounded(plant->l, u);
+}
+
+blw_mask_t blw_plant_screen(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid)
+{
+    blw_mask_t used = valid & BLW_MASK_ALL(plant->m);
+
+    for (size_t i = 0U; i < plant->m; i++) {
+        const bool in_range = (y[i] >= plant->y_min[i]) && (y[i] <= plant->y_max[i]);
+
+        if (!in_range || !blw_la_bounded(1U, &y[i])) {
+            used &= ~((blw_mask_t)1U << i);
+        }
+    }
+    return used;
+}
+
+void blw_plant_predict(const blw_plant_t *plant, const blw_real_t *x, const blw_real_t *u,
+                       blw_real_t *x_bar)
+{
+    blw_la_gemv(plant->n, plant->n, plant->A, x, x_bar);
+    if (u != NULL) {
+        blw_la_gemv_add(plant->n, plant->l, plant->Bu, u, x_bar);
+    }
+    if (!blw_la_bounded(plant->n, x_bar)) {
+        blw_la_copy(plant->n, plant->x0, x_bar);
+    }
+}
+
+void blw_plant_fill(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid,
+                    const blw_real_t *x_bar, blw_real_t *out)
+{
+    for (size_t i = 0U; i < plant->m; i++) {
+        if (((valid >> i) & 1U) != 0U) {
+            out[i] = y[i] - plant->offset[i];
+        } else {
+            out[i] = blw_la_dot(plant->n, &plant->C[i * plant->n], x_bar);
+        }
+    }
+}
+
+unsigned blw_mask_count(blw_mask_t mask)
+{
+    unsigned count = 0U;
+
+    for (blw_mask_t rest = mask; rest != 0U; rest &= rest - 1U) { /* clears the lowest bit */
+        count++;
+    }
+    return count;
+}

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw_step.h"
+
+blw_status_t blw_step_check(const blw_plant_t *plant, const blw_real_t *u, const blw_real_t *y,
+                            blw_mask_t valid)
+{
+    if ((y == NULL) || ((valid & ~BLW_MASK_ALL(plant->m)) != 0U)) {
+        return BLW_ERR_ARG;
+    }
+    return blw_plant_input_ok(plant, u) ? BLW_OK : BLW_ERR_INPUT;
+}
+
+uint8_t blw_step_flags(const blw_plant_t *plant, blw_mask_t used, blw_mask_t excluded)
+{
+    const blw_mask_t missing = BLW_MASK_ALL(plant->m) & ~used;
+    unsigned         flags   = 0U;
+
+    if (missing != 0U) {
+        flags |= BLW_FLAG_MISSING;
+    }
+    if (blw_mask_count(missing | excluded) > plant->p) {
+        flags |= BLW_FLAG_DEGRADED;
+    }
+    if ((used & ~excluded) == 0U) {
+        flags |= BLW_FLAG_BLIND;
+    }
+    return (uint8_t)flags;
+}
+
+blw_real_t blw_step_suspicion(blw_real_t s)
+{
+    return (s <= BLW_REAL_MAX) ? (s / (BLW_R(1.0) + s)) : BLW_R(1.0);
+}
