@@ -5,12 +5,18 @@
  * objective never rises; the end is verified with z and l formed anew from tau. */
 #include "blw_l1_internal.h"
 
-/* Residual on A, relative to c_g + |z|, below which a group may enter, and at the end. */
-#define RESIDUAL_ENTER BLW_R(1e-4)
-#define RESIDUAL_FINAL (BLW_R(4.0) * BLW_L1_SLACK)
+/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end; and
+ * low enough for either if full passes do not lower it any more, because the rounding of tau turns
+ * the direction of a very short nu_g. */
+#define RESIDUAL_ENTER   BLW_R(1e-4)
+#define RESIDUAL_FINAL   (BLW_R(4.0) * BLW_L1_SLACK)
+#define RESIDUAL_STALLED (BLW_R(8192.0) * BLW_REAL_EPS)
 
-/* Halvings of the bracket in the search along a step, pairs only. */
+/* Search along a step, pairs only: most halvings, the share of the first slope that counts as its
+ * end, and the share of |nu_g| below which a pair that stopped the step is taken to vanish. */
 #define BISECTIONS 40U
+#define SLOPE_LEFT BLW_R(0.25)
+#define VANISHED   BLW_R(1e-3)
 
 /* What a pass did. */
 typedef struct pass {
@@ -39,6 +45,20 @@ static pass_t first_crossing(const blw_l1_t *self, const blw_real_t *zeta)
     return pass;
 }
 
+/* nu of member k after alpha steps, two rows (the second 0 for one); r = its first row in step. */
+static void nu_after(const blw_l1_t *self, const blw_real_t *zeta, size_t k, size_t r,
+                     blw_real_t alpha, blw_real_t nu[2])
+{
+    const size_t g = blw_l1_member(self, k);
+    const size_t i = self->model->first[g];
+
+    nu[0] = (zeta[i] - self->tau[i]) - (alpha * self->step[r]);
+    nu[1] = BLW_R(0.0);
+    if (blw_l1_size(self->model, g) == 2U) {
+        nu[1] = (zeta[i + 1U] - self->tau[i + 1U]) - (alpha * self->step[r + 1U]);
+    }
+}
+
 /* Slope of the objective along the step at alpha. */
 static blw_real_t slope(const blw_l1_t *self, const blw_real_t *zeta, blw_real_t alpha)
 {
@@ -48,46 +68,67 @@ static blw_real_t slope(const blw_l1_t *self, const blw_real_t *zeta, blw_real_t
                      + (alpha * blw_la_dot(m->d, self->dz, self->dz));
 
     for (size_t k = 0U; k < self->n_A; k++) {
-        const size_t g     = blw_l1_member(self, k);
-        const size_t i     = m->first[g];
-        const size_t size  = blw_l1_size(m, g);
-        blw_real_t   nu[2] = {BLW_R(0.0), BLW_R(0.0)};
-        blw_real_t   dot   = BLW_R(0.0);
-        for (size_t j = 0U; j < size; j++) {
-            nu[j] = (zeta[i + j] - self->tau[i + j]) - (alpha * self->step[r + j]);
-            dot -= nu[j] * self->step[r + j];
-        }
+        const size_t g    = blw_l1_member(self, k);
+        const size_t size = blw_l1_size(m, g);
+        blw_real_t   nu[2];
+        nu_after(self, zeta, k, r, alpha, nu);
         const blw_real_t norm = blw_la_norm(2U, nu);
         if (norm > BLW_R(0.0)) {
-            sum += (m->c[g] * dot) / norm;
+            sum -= (m->c[g] * blw_la_dot(size, nu, &self->step[r])) / norm;
         }
         r += size;
     }
     return sum;
 }
 
-/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic. */
-static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
+/* The pair that shrinks most over alpha steps, if below the share VANISHED; else n_A. */
+static size_t vanished_pair(const blw_l1_t *self, const blw_real_t *zeta, blw_real_t alpha)
 {
-    blw_real_t low  = BLW_R(0.0);
-    blw_real_t high = pass->alpha;
+    blw_real_t least = VANISHED;
+    size_t     found = self->n_A;
+    size_t     r     = 0U;
 
-    if (slope(self, zeta, high) <= BLW_R(0.0)) {
-        return;
-    }
-    pass->blocked = self->n_A;
-    for (size_t h = 0U; (h < BISECTIONS) && ((low * BLW_R(1.25)) < high); h++) {
-        const blw_real_t middle = BLW_R(0.5) * (low + high);
-        if (slope(self, zeta, middle) > BLW_R(0.0)) {
-            high = middle;
-        } else {
-            low = middle;
+    for (size_t k = 0U; k < self->n_A; k++) {
+        const size_t g    = blw_l1_member(self, k);
+        const size_t size = blw_l1_size(self->model, g);
+        blw_real_t   nu[2];
+        nu_after(self, zeta, k, r, alpha, nu);
+        const blw_real_t share = blw_la_norm(2U, nu) / blw_l1_nu_norm(self, zeta, g);
+        if ((size == 2U) && (share < least)) {
+            least = share;
+            found = k;
         }
+        r += size;
     }
-    pass->alpha = (low > BLW_R(0.0)) ? low : high;
+    return found;
 }
 
-/* Drop every pair for which nu_g = 0 is the best with all others fixed: |l_g + Z_g Z_g' nu_g| <= c. */
+/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic, and
+ * a pair that is carried past 0 turns the slope round at once. */
+static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
+{
+    const blw_real_t most = -SLOPE_LEFT * slope(self, zeta, BLW_R(0.0));
+    blw_real_t       low  = BLW_R(0.0);
+    blw_real_t       high = pass->alpha;
+    blw_real_t       at   = slope(self, zeta, high);
+
+    if ((at <= most) || (high <= BLW_R(0.0))) {
+        return;
+    }
+    for (size_t h = 0U; (h < BISECTIONS) && (blw_la_abs(at) > most); h++) {
+        pass->alpha = BLW_R(0.5) * (low + high);
+        at          = slope(self, zeta, pass->alpha);
+        if (at > BLW_R(0.0)) {
+            high = pass->alpha;
+        } else {
+            low = pass->alpha;
+        }
+    }
+    pass->blocked = vanished_pair(self, zeta, pass->alpha);
+}
+
+/* Drop every pair for which nu_g = 0 is the best with all others fixed, |l_g + Z_g Z_g' nu_g| <= c_g,
+ * or that rounding has brought there. */
 static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
 {
     const blw_l1_model_t *const m       = self->model;
@@ -106,7 +147,7 @@ static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
             const blw_real_t        l[2]   = {
                 self->l[i] + (blw_la_dot(len[0], row[0], row[0]) * nu[0]) + (S01 * nu[1]),
                 self->l[i + 1U] + (S01 * nu[0]) + (blw_la_dot(len[1], row[1], row[1]) * nu[1])};
-            drop = (blw_la_norm(2U, l) <= m->c[g]);
+            drop = (blw_la_norm(2U, l) <= m->c[g]) || (blw_la_norm(2U, nu) <= BLW_R(0.0));
         }
         if (drop) {
             blw_l1_support_drop(self, zeta, k);
@@ -174,53 +215,43 @@ static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *bound)
     const pass_t pass = descend(self, zeta);
     *bound            = blw_l1_support_effect(self);
     blw_l1_multipliers(self);
-    return (pass.blocked == self->n_A) && (blw_l1_worst(self) == self->model->n_groups);
-}
-
-/* Whether the support is right and the residual on it as small as it gets: below the last slack, or
- * no longer halved by a pass that left A as it was. */
-static bool settled(const blw_l1_t *self, blw_real_t residual, blw_real_t before)
-{
-    return ((residual <= RESIDUAL_FINAL) || ((residual * BLW_R(2.0)) > before))
+    return (pass.blocked == self->n_A) && (blw_l1_support_residual(self) <= RESIDUAL_STALLED)
            && (blw_l1_worst(self) == self->model->n_groups);
 }
 
-/* Let the worst group into A if the residual there allows it.  @return the group or n_groups. */
-static size_t admit(blw_l1_t *self, blw_real_t residual)
+/* Whether the residual is below a limit, or stalled: no longer halved by a full pass on the same A. */
+static bool low(blw_real_t residual, blw_real_t before, blw_real_t limit)
 {
-    size_t g = self->model->n_groups;
-
-    if (residual <= RESIDUAL_ENTER) {
-        g = blw_l1_worst(self);
-    }
-    if (g < self->model->n_groups) {
-        enter(self, g);
-    }
-    return g;
+    return (residual <= limit)
+           || ((residual <= RESIDUAL_STALLED) && ((residual * BLW_R(2.0)) > before));
 }
 
 void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
     const size_t none   = self->model->n_groups;
-    blw_real_t   before = BLW_REAL_MAX;
+    blw_real_t   before = BLW_REAL_MAX; /* residual before the last pass, if that was a full one */
 
     blw_l1_multipliers(self);
     while (!info->converged && (info->iterations < self->model->max_iterations)) {
         const blw_real_t residual = blw_l1_support_residual(self);
+        const size_t     worst    = blw_l1_worst(self);
         const size_t     n_A      = self->n_A;
         info->iterations++;
-        if (settled(self, residual, before)) {
+        if ((worst == none) && low(residual, before, RESIDUAL_FINAL)) {
             info->converged = verify(self, zeta, &info->bound);
             before          = BLW_REAL_MAX;
             continue;
         }
-        const size_t entered = admit(self, residual);
-        const pass_t pass    = descend(self, zeta);
+        if ((worst != none) && low(residual, before, RESIDUAL_ENTER)) {
+            enter(self, worst);
+        }
+        const pass_t pass = descend(self, zeta);
         if (pass.blocked < self->n_A) {
             blw_l1_support_drop(self, zeta, pass.blocked);
         }
         blw_l1_multipliers(self);
         const bool dropped = blw_l1_has_pairs(self->model) && drop_pairs(self, zeta);
-        before = ((entered == none) && !dropped && (n_A == self->n_A)) ? residual : BLW_REAL_MAX;
+        const bool full    = !dropped && (n_A == self->n_A) && (pass.alpha >= BLW_R(1.0));
+        before             = full ? residual : BLW_REAL_MAX;
     }
 }

@@ -11,7 +11,10 @@
 #define ALPHA BLW_R(1.6)
 
 /* Residuals relative to c_g below which the support of t is worth verifying. */
-#define RESIDUAL_TRY BLW_R(1e-3)
+#define RESIDUAL_TRY BLW_R(1e-2)
+
+/* Passes kept back for the active set, per row. */
+#define RESERVE 2U
 
 /* t of the last solve on its support, 0 elsewhere; u = l / rho, l cut to the thresholds: that is
  * where u ends when t is right. */
@@ -104,11 +107,12 @@ static void take_support(blw_l1_t *self, const blw_real_t *zeta)
 
 void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
-    const blw_l1_model_t *const m     = self->model;
-    blw_real_t                  worst = BLW_REAL_MAX;
+    const blw_l1_model_t *const m       = self->model;
+    const size_t                reserve = (size_t)RESERVE * m->N;
+    blw_real_t                  worst   = BLW_REAL_MAX;
 
     start(self, zeta);
-    while ((worst > RESIDUAL_TRY) && (info->iterations < m->max_iterations)) {
+    while ((worst > RESIDUAL_TRY) && ((info->iterations + reserve) < m->max_iterations)) {
         worst = admm_pass(self, zeta);
         info->iterations++;
     }
