@@ -10,9 +10,9 @@ static bool edges_ok(const blw_jordan_model_t *model)
     const size_t second = (r >= 2U) ? (r - 2U) : 0U;
 
     return !(blw_la_abs(model->J1[r - 1U]) > BLW_R(0.0))
-        && !(blw_la_abs(model->J2[r - 1U]) > BLW_R(0.0))
-        && !(blw_la_abs(model->J2[second]) > BLW_R(0.0))
-        && !(blw_la_abs(model->Jm[0]) > BLW_R(0.0));
+           && !(blw_la_abs(model->J2[r - 1U]) > BLW_R(0.0))
+           && !(blw_la_abs(model->J2[second]) > BLW_R(0.0))
+           && !(blw_la_abs(model->Jm[0]) > BLW_R(0.0));
 }
 
 blw_status_t blw_jordan_check(const blw_jordan_model_t *model, const blw_plant_t *plant,
@@ -56,7 +56,7 @@ void blw_jordan_step_sensor(const blw_jordan_model_t *model, size_t i, const blw
         const blw_real_t after = ((j + 2U) < r) ? zeta_i[j + 2U] : BLW_R(0.0);
 
         zeta_i[j] = (model->J0[j] * here) + (model->J1[j] * next) + (model->J2[j] * after)
-                  + (model->Jm[j] * prev) + (b[j] * y_i);
+                    + (model->Jm[j] * prev) + (b[j] * y_i);
         if (l > 0U) {
             zeta_i[j] += blw_la_dot(l, &model->D[((i * r) + j) * l], u);
         }

@@ -120,7 +120,8 @@ static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info
     const blw_real_t e       = blw_la_sqrt(BLW_R(2.0) * info->gap);
     const blw_real_t z_least = blw_la_max(z - e, BLW_R(0.0));
     const blw_real_t best    = sum + (BLW_R(0.5) * ((z * z) - (z_least * z_least)));
-    info->bound              = m->kappa_G * (sum + best + (m->kappa_W * e));
+    const blw_real_t bound   = m->kappa_G * (sum + best + (m->kappa_W * e));
+    info->bound              = (bound <= BLW_REAL_MAX) ? bound : BLW_REAL_MAX;
 }
 
 /* Take tau on A from the last solve: nu then absorbs what changed, and a group whose nu has turned
@@ -187,6 +188,8 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
         info->kalman    = true;
         info->converged = true;
         blw_l1_support_clear(self, zeta);
+    } else if (!(info->statistic <= BLW_REAL_MAX)) {
+        blw_l1_support_clear(self, zeta); /* a NaN: nothing can be said of it */
     } else if (m->engine == (uint8_t)BLW_L1_ADMM) {
         blw_l1_admm(self, zeta, info);
     } else {

@@ -229,7 +229,8 @@ static bool low(blw_real_t residual, blw_real_t before, blw_real_t limit)
 void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
     const size_t none   = self->model->n_groups;
-    blw_real_t   before = BLW_REAL_MAX; /* residual before the last pass, if that was a full one */
+    blw_real_t   before = BLW_REAL_MAX;   /* residual before the last pass, if that was a full one */
+    blw_real_t   enough = RESIDUAL_ENTER; /* residual below which a group may enter */
 
     blw_l1_multipliers(self);
     while (!info->converged && (info->iterations < self->model->max_iterations)) {
@@ -242,13 +243,15 @@ void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *in
             before          = BLW_REAL_MAX;
             continue;
         }
-        if ((worst != none) && low(residual, before, RESIDUAL_ENTER)) {
+        if ((worst != none) && low(residual, before, enough)) {
             enter(self, worst);
         }
         const pass_t pass = descend(self, zeta);
         if (pass.blocked < self->n_A) {
             blw_l1_support_drop(self, zeta, pass.blocked);
         }
+        /* a group that cannot move was let in too early: next time the rest has to settle first */
+        enough = (pass.alpha > BLW_R(0.0)) ? RESIDUAL_ENTER : RESIDUAL_FINAL;
         blw_l1_multipliers(self);
         const bool dropped = blw_l1_has_pairs(self->model) && drop_pairs(self, zeta);
         const bool full    = !dropped && (n_A == self->n_A) && (pass.alpha >= BLW_R(1.0));

@@ -6,8 +6,8 @@
 /* Method and P belong together: without P the states are fused as they are. */
 static bool method_ok(const blw_lasso_model_t *model)
 {
-    const uint8_t expected = (uint8_t)((model->P == NULL) ? BLW_METHOD_LASSO
-                                                          : BLW_METHOD_CANONICAL);
+    const uint8_t expected =
+        (uint8_t)((model->P == NULL) ? BLW_METHOD_LASSO : BLW_METHOD_CANONICAL);
 
     return model->head.method == expected;
 }
@@ -17,8 +17,8 @@ static bool sizes_ok(const blw_lasso_model_t *model)
     const blw_plant_t *const plant = model->head.plant;
 
     return (model->l1->n == plant->n)
-        && (model->l1->N == ((size_t)model->jordan->r * model->jordan->m))
-        && (model->ambiguous <= 1U);
+           && (model->l1->N == ((size_t)model->jordan->r * model->jordan->m))
+           && (model->ambiguous <= 1U);
 }
 
 static blw_status_t check_model(const blw_lasso_model_t *model)
@@ -71,6 +71,7 @@ blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, b
     }
     const blw_plant_t *const    plant = model->head.plant;
     const blw_l1_model_t *const l1    = model->l1;
+
     self->base.ops  = &blw_lasso_ops;
     self->model     = model;
     self->zeta      = blw_la_take(&mem, l1->N);
@@ -141,8 +142,7 @@ static void judge_sensors(blw_lasso_t *self, blw_mask_t used)
         const bool missing = ((used >> i) & 1U) == 0U;
 
         self->suspicion[i] =
-            missing ? BLW_R(1.0)
-                    : blw_step_suspicion(blw_l1_excess(&self->l1, self->xi, i * r, r));
+            missing ? BLW_R(1.0) : blw_step_suspicion(blw_l1_excess(&self->l1, self->xi, i * r, r));
     }
 }
 

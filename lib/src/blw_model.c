@@ -59,7 +59,7 @@ void blw_table_add_real(blw_table_check_t *check, blw_real_t value)
 static bool sizes_ok(const blw_plant_t *plant)
 {
     return (plant->n >= 1U) && (plant->m >= 1U) && (plant->m <= BLW_MAX_SENSORS)
-        && (plant->p < plant->m);
+           && (plant->p < plant->m);
 }
 
 static bool ranges_ok(const blw_plant_t *plant)

@@ -24,14 +24,14 @@
 #ifdef BLW_REAL_DOUBLE
 typedef double blw_real_t;
 #define BLW_R(literal) literal
-#define BLW_REAL_MAX DBL_MAX
-#define BLW_REAL_EPS DBL_EPSILON
+#define BLW_REAL_MAX   DBL_MAX
+#define BLW_REAL_EPS   DBL_EPSILON
 #define BLW_SIGNAL_MAX 1e150
 #else
 typedef float blw_real_t;
 #define BLW_R(literal) literal##F
-#define BLW_REAL_MAX FLT_MAX
-#define BLW_REAL_EPS FLT_EPSILON
+#define BLW_REAL_MAX   FLT_MAX
+#define BLW_REAL_EPS   FLT_EPSILON
 #define BLW_SIGNAL_MAX 1e15F
 #endif
 

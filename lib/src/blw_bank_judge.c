@@ -1,0 +1,154 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw_bank_internal.h"
+#include "blw_la.h"
+
+void blw_bank_judge_reset(blw_bank_t *self)
+{
+    const blw_bank_model_t *const model = self->model;
+    const size_t                  pairs = (size_t)model->sets * model->per_set;
+
+    if (model->window == 0U) {
+        blw_la_copy(pairs, model->start, self->average);
+    } else {
+        blw_la_fill(pairs * model->groups, BLW_R(0.0), self->average);
+    }
+    blw_la_fill(model->sets, BLW_R(0.0), self->worst);
+    blw_la_fill(model->sets, BLW_R(0.0), self->gross);
+    self->blocks  = 0U;
+    self->decided = false;
+}
+
+/* Samples of the block less C x_ref(t), C A x_ref(t), ...: the innovations were taken against a
+ * reference that moved, and z is how far it had moved by then. */
+static void rebuild_block(blw_bank_t *self, size_t oldest)
+{
+    const blw_plant_t *const plant = self->model->head.plant;
+    const size_t             n     = plant->n;
+    const size_t             m     = plant->m;
+    const size_t             h     = self->model->horizon;
+    blw_real_t *const        z     = self->scratch;
+    blw_real_t *const        moved = &self->scratch[n];
+
+    blw_la_fill(n, BLW_R(0.0), z);
+    for (size_t j = 0U; j < h; j++) {
+        const size_t slot = (oldest + j) % h;
+
+        blw_la_copy(m, &self->past_e[slot * m], &self->block[j * m]);
+        blw_la_gemv_add(m, n, plant->C, z, &self->block[j * m]);
+        blw_la_copy(n, z, moved);
+        blw_la_axpy(n, BLW_R(1.0), &self->past_move[slot * n], moved);
+        blw_la_gemv(n, n, plant->A, moved, z);
+    }
+}
+
+/* (2) for one subset.  @return the next subset's Z */
+static const blw_real_t *estimate_subset(blw_bank_t *self, size_t i, const blw_real_t *Z)
+{
+    const uint16_t    mask    = self->model->subset_mask[i];
+    const size_t      n       = self->model->head.plant->n;
+    const size_t      m       = self->model->head.plant->m;
+    const size_t      samples = (size_t)self->model->horizon * m;
+    const size_t      columns = (size_t)self->model->horizon * blw_mask_count(mask);
+    blw_real_t *const x       = &self->x_fir[i * n];
+    size_t            column  = 0U;
+
+    blw_la_fill(n, BLW_R(0.0), x);
+    for (size_t j = 0U; j < samples; j++) {
+        if (blw_bank_has(mask, j % m)) {
+            blw_bank_add_column(n, columns, &Z[column], self->block[j], x);
+            column++;
+        }
+    }
+    return &Z[n * columns];
+}
+
+/* No sample of the subset is missing in the block. */
+static bool complete(const blw_bank_t *self, size_t subset)
+{
+    const uint16_t mask = self->model->subset_mask[subset];
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        if (blw_bank_has(mask, i) && (self->age[i] < self->model->horizon)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* (3) over its threshold, at most ratio_max; a NaN counts as ratio_max. */
+static blw_real_t ratio_of(const blw_bank_t *self, size_t pair, size_t oldest)
+{
+    const blw_bank_model_t *const model = self->model;
+    const size_t                  n     = model->head.plant->n;
+    const size_t                  set   = pair / model->per_set;
+    const blw_real_t *const       x_i   = &self->x_fir[model->pair[pair] * n];
+    const blw_real_t *const       x_s   = &self->past_d[((oldest * model->sets) + set) * n];
+    blw_real_t                    q     = BLW_R(0.0);
+
+    for (size_t j = 0U; j < n; j++) {
+        const blw_real_t rho = x_i[j] - x_s[j];
+
+        q += rho * rho;
+    }
+    const blw_real_t ratio = q * model->scale[pair];
+    return (ratio <= model->ratio_max) ? ratio : model->ratio_max;
+}
+
+static void average_pair(blw_bank_t *self, size_t pair, size_t oldest)
+{
+    const blw_bank_model_t *const model = self->model;
+    const bool                    known = complete(self, model->pair[pair]);
+
+    if (model->window != 0U) {
+        const size_t     group = (pair * model->groups) + (self->blocks % model->groups);
+        const blw_real_t ratio = known ? ratio_of(self, pair, oldest) : model->start[pair];
+
+        self->average[group] += model->gain * ratio;                                      /* (5) */
+    } else if (known) {
+        self->average[pair] += model->gain * (ratio_of(self, pair, oldest) - self->average[pair]);
+    } else {
+        /* (4) waits for the next complete block */
+    }
+}
+
+static void decide(blw_bank_t *self)
+{
+    const blw_bank_model_t *const model = self->model;
+    const size_t                  tests = (size_t)model->per_set * model->groups;
+
+    for (size_t s = 0U; s < model->sets; s++) {
+        blw_real_t worst = BLW_R(0.0);
+
+        for (size_t i = 0U; i < tests; i++) {
+            worst = blw_la_max(worst, self->average[(s * tests) + i]);
+        }
+        self->worst[s] = worst;
+    }
+    self->decided = true;
+}
+
+void blw_bank_judge(blw_bank_t *self)
+{
+    const blw_bank_model_t *const model  = self->model;
+    const size_t                  pairs  = (size_t)model->sets * model->per_set;
+    const size_t                  oldest = ((size_t)self->newest + 1U) % model->horizon;
+    const blw_real_t             *Z      = model->Z;
+
+    rebuild_block(self, oldest);
+    for (size_t i = 0U; i < model->subsets; i++) {
+        Z = estimate_subset(self, i, Z);
+    }
+    for (size_t i = 0U; i < pairs; i++) {
+        average_pair(self, i, oldest);
+    }
+    if (model->window == 0U) {
+        decide(self);
+        return;
+    }
+    self->blocks++;
+    if (self->blocks == model->window) {
+        decide(self);
+        blw_la_fill(pairs * model->groups, BLW_R(0.0), self->average);
+        self->blocks = 0U;
+    }
+}

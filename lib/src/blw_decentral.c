@@ -1,0 +1,334 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw/blw_decentral.h"
+#include "blw_decentral_internal.h"
+#include "blw_la.h"
+#include "blw_step.h"
+
+/* An innovation is cut to so many times its own threshold: squares of what follows stay finite. */
+#define INNOVATION_MAX BLW_R(3e8)
+
+/* Steps in a row without suspicion after which a filter is seeded anew. */
+#define CALM_STEPS 4U
+
+static size_t mem_len_of(const blw_decentral_model_t *model)
+{
+    const blw_plant_t *const plant = model->head.plant;
+
+    return BLW_DECENTRAL_MEM(plant->n, plant->m, model->mu, model->rows,
+                             (model->steady == NULL) ? 1 : 0);
+}
+
+static void bind(blw_decentral_t *self, blw_real_t *mem)
+{
+    const blw_decentral_model_t *const model = self->model;
+    const size_t                       n     = model->head.plant->n;
+    const size_t                       m     = model->head.plant->m;
+    const size_t                       mu    = model->mu;
+    const bool                         steady = model->steady != NULL;
+
+    self->x_hat     = blw_la_take(&mem, n);
+    self->x_bar     = blw_la_take(&mem, n);
+    self->dx        = blw_la_take(&mem, n);
+    self->nu        = blw_la_take(&mem, m);
+    self->gap       = blw_la_take(&mem, m);
+    self->suspicion = blw_la_take(&mem, m);
+    self->delta     = blw_la_take(&mem, mu);
+    self->z         = blw_la_take(&mem, mu);
+    self->w         = blw_la_take(&mem, steady ? (mu - n) : (mu + n + m));
+    self->t         = steady ? blw_la_take(&mem, model->rows) : NULL;
+    self->L         = steady ? NULL : blw_la_take(&mem, blw_la_packed_row(mu));
+    self->X         = steady ? NULL : blw_la_take(&mem, mu * (mu + n + m));
+}
+
+blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model_t *model,
+                                blw_real_t *mem, size_t mem_len)
+{
+    if ((self == NULL) || (model == NULL) || (mem == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_status_t status = blw_decentral_check(model);
+    if (status != BLW_OK) {
+        return status;
+    }
+    if (mem_len < mem_len_of(model)) {
+        return BLW_ERR_MEM;
+    }
+    self->base.ops = &blw_decentral_ops;
+    self->model    = model;
+    bind(self, mem);
+    return blw_decentral_reset(self, NULL);
+}
+
+blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_t *x0)
+{
+    if (self == NULL) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant = self->model->head.plant;
+    const blw_real_t *const  start = (x0 != NULL) ? x0 : plant->x0;
+    if (!blw_la_bounded(plant->n, start)) {
+        return BLW_ERR_ARG;
+    }
+    blw_la_copy(plant->n, start, self->x_hat);
+    blw_la_fill(self->model->mu, BLW_R(0.0), self->delta);
+    blw_la_fill(plant->m, BLW_R(0.0), self->gap);
+    self->k      = 0U;
+    self->set    = 0U;
+    self->passes = 0U;
+    self->calm   = 0U;
+    self->usable = true;
+    if (self->model->recursive != NULL) {
+        blw_decentral_recursive_reset(self);
+    }
+    return BLW_OK;
+}
+
+void blw_decentral_advance(blw_decentral_t *self)
+{
+    if (self->model->steady != NULL) {
+        blw_decentral_steady_advance(self);
+    } else {
+        blw_decentral_recursive_advance(self);
+    }
+}
+
+blw_real_t blw_decentral_statistic(blw_decentral_t *self, size_t set)
+{
+    return (self->model->steady != NULL) ? blw_decentral_steady_statistic(self, set)
+                                         : blw_decentral_recursive_statistic(self, set);
+}
+
+void blw_decentral_estimate(blw_decentral_t *self, size_t set)
+{
+    if (self->model->steady != NULL) {
+        blw_decentral_steady_estimate(self, set);
+    } else {
+        blw_decentral_recursive_estimate(self, set);
+    }
+}
+
+blw_real_t blw_decentral_all_statistic(blw_decentral_t *self, size_t set)
+{
+    return (self->model->steady != NULL) ? blw_decentral_steady_all_statistic(self, set)
+                                         : blw_decentral_recursive_statistic(self, 0U);
+}
+
+/* nu_i, suspicion and gap of every sensor; nu_i = 0 where the sample is missing. */
+static void innovate(blw_decentral_t *self, const blw_real_t *y, blw_mask_t used)
+{
+    const blw_decentral_model_t *const model = self->model;
+    const blw_plant_t *const           plant = model->head.plant;
+
+    for (size_t i = 0U; i < plant->m; i++) {
+        if (((used >> i) & 1U) == 0U) {
+            self->nu[i]        = BLW_R(0.0);
+            self->suspicion[i] = BLW_R(1.0);
+            if (self->gap[i] <= (blw_real_t)model->max_gap) {
+                self->gap[i] += BLW_R(1.0);
+            }
+            continue;
+        }
+        const blw_real_t nu = (y[i] - plant->offset[i])
+                            - blw_la_dot(plant->n, &plant->C[i * plant->n], self->x_bar);
+        const blw_real_t e = blw_la_abs(nu) * model->scale[i];
+        self->nu[i]        = (e > INNOVATION_MAX) ? (nu * (INNOVATION_MAX / e)) : nu;
+        self->suspicion[i] = blw_step_suspicion(e * e);
+        self->gap[i]       = BLW_R(0.0);
+    }
+}
+
+/* Sensors that have been missing for longer than a filter should coast. */
+static blw_mask_t silent_sensors(const blw_decentral_t *self)
+{
+    blw_mask_t silent = 0U;
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        if (self->gap[i] > (blw_real_t)self->model->max_gap) {
+            silent |= (blw_mask_t)1U << i;
+        }
+    }
+    return silent;
+}
+
+static void exclude(blw_decentral_t *self, size_t set)
+{
+    self->set    = (uint16_t)set;
+    self->passes = 0U;
+    self->calm   = 0U;
+}
+
+/* Passes of all sensors in a row; a sensor that is not heard cannot earn its return. */
+static void count_passes(blw_decentral_t *self, bool pass, blw_mask_t used)
+{
+    const blw_mask_t out = blw_decentral_members(self->model->sets, self->set);
+
+    if (!pass) {
+        self->passes = 0U;
+    } else if (((out & ~used) == 0U) && (self->passes < self->model->readmit)) {
+        self->passes++;
+    }
+}
+
+/* An excluded sensor that agrees with the prediction again need not wait for its filter to forget
+ * the attack: its state becomes that of the estimate. */
+static void reseed(blw_decentral_t *self, bool pass)
+{
+    const blw_decentral_model_t *const model = self->model;
+    bool                               calm  = !pass;
+
+    for (size_t rest = self->set; rest != 0U; rest = model->sets->parent[rest]) {
+        calm = calm && (self->suspicion[model->sets->sensor[rest]] <= BLW_R(0.5));
+    }
+    self->calm = calm ? (uint16_t)(self->calm + 1U) : 0U;
+    if (self->calm >= CALM_STEPS) {
+        blw_decentral_leave_out(self, self->set);
+        blw_la_copy(model->mu, self->z, self->delta);
+        self->calm = 0U;
+    }
+}
+
+static blw_outcome_t search(blw_decentral_t *self, blw_mask_t silent, uint16_t *compared)
+{
+    const blw_decentral_model_t *const model  = self->model;
+    const bool                         spare  = blw_mask_count(silent) < model->head.plant->p;
+    const size_t                       best   = blw_decentral_search(self, spare ? silent : 0U,
+                                                                     compared);
+    const blw_real_t                   g      = blw_decentral_statistic(self, best);
+
+    if (best != self->set) {
+        exclude(self, best);
+    }
+    blw_decentral_estimate(self, best);
+    return (g <= blw_decentral_threshold(model, best)) ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_HELD;
+}
+
+static bool warming_up(const blw_decentral_t *self)
+{
+    return (self->k <= self->model->warm_up) || !self->usable;
+}
+
+/* Fusion, test and choice of the set; fills in what *out says about them. */
+static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimator_out_t *out)
+{
+    const blw_decentral_model_t *const model  = self->model;
+    const blw_mask_t                   silent = silent_sensors(self);
+
+    out->threshold = blw_decentral_threshold(model, 0U);
+    if ((self->set == 0U) && (silent != 0U) && self->usable) {
+        exclude(self, blw_decentral_cover(model->sets, silent));
+    }
+    const blw_real_t g = blw_decentral_statistic(self, self->set);
+    blw_decentral_estimate(self, self->set);
+    out->statistic = (self->set == 0U) ? g : blw_decentral_all_statistic(self, self->set);
+    const bool pass = out->statistic <= out->threshold;
+    count_passes(self, pass, used);
+    if (warming_up(self)) {
+        return BLW_OUTCOME_KALMAN;
+    }
+    if ((self->set != 0U) && (model->readmit > 0U) && (self->passes >= model->readmit)) {
+        exclude(self, 0U);
+        (void)blw_decentral_statistic(self, 0U);
+        blw_decentral_estimate(self, 0U);
+        return BLW_OUTCOME_KALMAN;
+    }
+    if (g <= blw_decentral_threshold(model, self->set)) {
+        return (self->set == 0U) ? BLW_OUTCOME_KALMAN : BLW_OUTCOME_CONVERGED;
+    }
+    return search(self, silent, &out->iterations);
+}
+
+/* (2), or the prediction if the fusion overflows. */
+static blw_mask_t update(blw_decentral_t *self, blw_mask_t used)
+{
+    const size_t n  = self->model->head.plant->n;
+    const size_t mu = self->model->mu;
+
+    blw_la_copy(n, self->x_bar, self->x_hat);
+    blw_la_axpy(n, BLW_R(1.0), self->dx, self->x_hat);
+    if (!blw_la_bounded(n, self->x_hat)) {
+        blw_la_copy(n, self->x_bar, self->x_hat);
+        blw_la_fill(mu, BLW_R(0.0), self->delta);
+        return 0U;
+    }
+    for (size_t row = 0U; row < mu; row++) {
+        self->delta[row] -= blw_la_dot(n, &self->model->Phi[row * n], self->dx);
+    }
+    return used;
+}
+
+static void report(const blw_decentral_t *self, blw_outcome_t outcome, blw_mask_t used,
+                   blw_estimator_out_t *out)
+{
+    out->x_hat     = self->x_hat;
+    out->suspicion = self->suspicion;
+    out->excluded  = blw_decentral_members(self->model->sets, self->set);
+    out->used      = used;
+    out->outcome   = (uint8_t)outcome;
+    out->flags     = blw_step_flags(self->model->head.plant, used, out->excluded);
+    if (warming_up(self)) {
+        out->flags = (uint8_t)(out->flags | BLW_FLAG_WARMING_UP);
+    }
+}
+
+blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, const blw_real_t *y,
+                                blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+    if (status != BLW_OK) {
+        return status;
+    }
+    blw_mask_t used = blw_plant_screen(plant, y, valid);
+
+    *out = (blw_estimator_out_t){0};
+    self->k += (self->k <= self->model->warm_up) ? 1U : 0U;
+    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
+    innovate(self, y, used);
+    blw_decentral_advance(self);
+    const blw_outcome_t outcome = decide(self, used, out);
+    used = update(self, used);
+    if ((self->model->reseed != 0U) && (self->set != 0U)) {
+        reseed(self, out->statistic <= out->threshold);
+    }
+    report(self, outcome, used, out);
+    return BLW_OK;
+}
+
+static size_t ops_mem_len(const blw_model_t *model)
+{
+    if ((model == NULL) || (model->plant == NULL)
+        || (model->method != (uint8_t)BLW_METHOD_DECENTRAL)) {
+        return 0U;
+    }
+    return mem_len_of((const blw_decentral_model_t *)model);
+}
+
+static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
+                             size_t mem_len)
+{
+    return blw_decentral_init((blw_decentral_t *)self, (const blw_decentral_model_t *)model, mem,
+                              mem_len);
+}
+
+static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+{
+    return blw_decentral_reset((blw_decentral_t *)self, x0);
+}
+
+static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    return blw_decentral_step((blw_decentral_t *)self, u, y, valid, out);
+}
+
+const blw_estimator_ops_t blw_decentral_ops = {
+    .method     = BLW_METHOD_DECENTRAL,
+    .state_size = sizeof(blw_decentral_t),
+    .mem_len    = ops_mem_len,
+    .init       = ops_init,
+    .reset      = ops_reset,
+    .step       = ops_step,
+};

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// Random instances of the l1 fusion, reduced with Eigen, and an independent ADMM for them.
+#ifndef RANDOM_L1_H
+#define RANDOM_L1_H
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "blw/blw_l1.h"
+
+namespace reference {
+
+using Matrix = Eigen::MatrixXd;
+using Vector = Eigen::VectorXd;
+
+// The tables of one instance of (1) in blw_l1.h, in double and as the library takes them.
+class Problem {
+public:
+    // sizes: rows of every group, 1 or 2; n states.
+    Problem(unsigned seed, const std::vector<int> &sizes, int n, double threshold)
+        : random_(seed), N_(0), n_(n), c_(static_cast<Eigen::Index>(sizes.size()))
+    {
+        first_.push_back(0);
+        for (const int size : sizes) {
+            N_ += size;
+            first_.push_back(static_cast<uint16_t>(N_));
+        }
+        G_             = normal(N_, n);
+        const Matrix X = normal(N_, N_);
+        W_             = X * X.transpose() / N_ + 0.02 * Matrix::Identity(N_, N_);
+        reduce();
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            c_(g) = threshold * (1.0 + 0.3 * std::abs(normal(1, 1)(0)));
+        }
+        convert();
+    }
+
+    Matrix normal(Eigen::Index rows, Eigen::Index cols)
+    {
+        std::normal_distribution<double> distribution;
+        return Matrix::NullaryExpr(rows, cols, [&] { return distribution(random_); });
+    }
+
+    // G x + benign noise + attack on the groups of one part of the rows.
+    Vector sample(double attack)
+    {
+        const Eigen::LLT<Matrix> W(W_);
+        Vector zeta = G_ * normal(n_, 1) + W.matrixL() * normal(N_, 1);
+        zeta.head(N_ / 4) += attack * normal(N_ / 4, 1);
+        return zeta;
+    }
+
+    // (2) by ADMM in double, started cold: an algorithm and a linear algebra of its own.
+    Vector solve(const Vector &zeta, int passes) const
+    {
+        const Matrix S   = Z_ * Z_.transpose();
+        const double rho = 0.3;
+        const Eigen::LLT<Matrix> M(S + rho * Matrix::Identity(N_, N_));
+        Vector t = Vector::Zero(N_);
+        Vector u = Vector::Zero(N_);
+        for (int pass = 0; pass < passes; ++pass) {
+            const Vector nu = M.solve(S * zeta + rho * (t - u));
+            const Vector v  = 1.6 * nu - 0.6 * t + u;
+            for (Eigen::Index g = 0; g < c_.size(); ++g) {
+                const auto   rows = v.segment(first(g), size(g));
+                const double keep = std::max(0.0, 1.0 - c_(g) / rho / std::max(rows.norm(), 1e-300));
+                t.segment(first(g), size(g)) = keep * rows;
+            }
+            u = v - t;
+        }
+        return F_ * (zeta - t);
+    }
+
+    // Largest violation of the optimality conditions (4), relative to c_g, for nu = zeta - tau.
+    double violation(const Vector &zeta, const Vector &tau) const
+    {
+        const Vector nu    = zeta - tau;
+        const Vector l     = Z_ * (Z_.transpose() * tau);
+        double       worst = 0.0;
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            const Vector l_g  = l.segment(first(g), size(g));
+            const Vector nu_g = nu.segment(first(g), size(g));
+            worst             = std::max(worst, (l_g.norm() - c_(g)) / c_(g));
+            if (nu_g.norm() > 0.0) {
+                worst = std::max(worst, (l_g - c_(g) * nu_g.normalized()).norm() / c_(g));
+            }
+        }
+        return worst;
+    }
+
+    blw_l1_model_t model(blw_l1_engine_t engine, int max_iterations) const
+    {
+        blw_l1_model_t m{};
+        m.N              = static_cast<uint16_t>(N_);
+        m.d              = static_cast<uint16_t>(N_ - n_);
+        m.n_groups       = static_cast<uint16_t>(c_.size());
+        m.max_iterations = static_cast<uint16_t>(max_iterations);
+        m.n              = static_cast<uint8_t>(n_);
+        m.engine         = static_cast<uint8_t>(engine);
+        m.first          = first_.data();
+        m.Z              = Z_table_.data();
+        m.F              = F_table_.data();
+        m.c              = c_table_.data();
+        m.M              = (engine == BLW_L1_ADMM) ? M_table_.data() : nullptr;
+        m.rho            = (engine == BLW_L1_ADMM) ? BLW_R(0.3) : BLW_R(0.0);
+        m.kappa_G        = static_cast<blw_real_t>(kappa_G_);
+        m.kappa_W        = static_cast<blw_real_t>(kappa_W_);
+        return m;
+    }
+
+    int rows() const { return N_; }
+    int states() const { return n_; }
+    Vector kalman(const Vector &zeta) const { return F_ * zeta; }
+
+private:
+    Eigen::Index first(Eigen::Index g) const { return first_[static_cast<size_t>(g)]; }
+    Eigen::Index size(Eigen::Index g) const { return first_[static_cast<size_t>(g) + 1] - first(g); }
+
+    // Z, F for rows scaled so that Z Z' has unit mean square over every group.
+    void reduce()
+    {
+        const Matrix Winv = W_.inverse();
+        const Matrix P    = (G_.transpose() * Winv * G_).inverse();
+        const Matrix S    = Winv - Winv * G_ * P * G_.transpose() * Winv;
+        Vector       s(N_);
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            const double trace = S.diagonal().segment(first(g), size(g)).sum();
+            s.segment(first(g), size(g)).setConstant(std::sqrt(trace / double(size(g))));
+        }
+        const Eigen::JacobiSVD<Matrix> svd(S, Eigen::ComputeFullU);
+        const int    d    = N_ - n_;
+        const Matrix root = svd.matrixU().leftCols(d)
+                            * svd.singularValues().head(d).cwiseSqrt().asDiagonal();
+        const Matrix scaled = s.cwiseInverse().asDiagonal() * root;
+        const Eigen::HouseholderQR<Matrix> qr(scaled.topRows(d).transpose());
+        const Matrix Q = qr.householderQ();
+        Z_             = scaled * Q;
+        G_             = s.asDiagonal() * G_;
+        W_             = s.asDiagonal() * W_ * s.asDiagonal();
+        F_             = P * G_.transpose() * W_.inverse();
+    }
+
+    void convert()
+    {
+        const int d = N_ - n_;
+        for (int i = 0; i < N_; ++i) {
+            for (int j = 0; j < std::min(i + 1, d); ++j) {
+                Z_table_.push_back(static_cast<blw_real_t>(Z_(i, j)));
+            }
+        }
+        const Matrix M = (Z_ * Z_.transpose() + 0.3 * Matrix::Identity(N_, N_)).inverse();
+        for (int i = 0; i < N_; ++i) {
+            for (int j = 0; j <= i; ++j) {
+                M_table_.push_back(static_cast<blw_real_t>(M(i, j)));
+            }
+        }
+        for (int i = 0; i < n_; ++i) {
+            for (int j = 0; j < N_; ++j) {
+                F_table_.push_back(static_cast<blw_real_t>(F_(i, j)));
+            }
+        }
+        Vector rows_c(N_);
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            c_table_.push_back(static_cast<blw_real_t>(c_(g)));
+            rows_c.segment(first(g), size(g)).setConstant(c_(g));
+        }
+        const Matrix cG  = rows_c.asDiagonal() * G_;
+        const Matrix cWZ = rows_c.asDiagonal() * W_ * Z_;
+        kappa_G_         = 1.0 / cG.jacobiSvd().singularValues().minCoeff();
+        kappa_W_ = std::sqrt(double(c_.size())) * cWZ.jacobiSvd().singularValues().maxCoeff();
+    }
+
+    std::mt19937            random_;
+    int                     N_;
+    int                     n_;
+    Vector                  c_;
+    std::vector<uint16_t>   first_;
+    Matrix                  G_, W_, Z_, F_;
+    std::vector<blw_real_t> Z_table_, F_table_, c_table_, M_table_;
+    double                  kappa_G_ = 0.0;
+    double                  kappa_W_ = 0.0;
+};
+
+} // namespace reference
+#endif

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MIT
+// The l1 fusion against optimality conditions and an ADMM of Eigen's, on random problems.
+#include <cstdio>
+#include <limits>
+
+#include "random_l1.h"
+
+namespace {
+
+using reference::Problem;
+using reference::Vector;
+
+int failures = 0;
+
+void expect(bool ok, const char *what, unsigned seed, double value)
+{
+    if (!ok) {
+        std::printf("FAIL %s, seed %u: %g\n", what, seed, value);
+        ++failures;
+    }
+}
+
+constexpr bool   is_double = (sizeof(blw_real_t) == 8);
+constexpr double tolerance = is_double ? 1e-9 : 3e-3; // relative to thresholds of size 1
+
+// The library on one problem; holds state and memory, so that solves start warm.
+class Solver {
+public:
+    Solver(const Problem &problem, blw_l1_engine_t engine, int max_iterations)
+        : model_(problem.model(engine, max_iterations)),
+          memory_(BLW_L1_MEM(model_.N, model_.d, model_.n_groups),
+                  std::numeric_limits<blw_real_t>::quiet_NaN())
+    {
+        blw_l1_init(&state_, &model_, memory_.data());
+    }
+
+    Vector solve(const Vector &zeta)
+    {
+        const std::vector<blw_real_t> z(zeta.data(), zeta.data() + zeta.size());
+        std::vector<blw_real_t>       x(model_.n);
+        blw_l1_solve(&state_, z.data(), x.data(), &info);
+        return Eigen::Map<Eigen::Matrix<blw_real_t, Eigen::Dynamic, 1>>(x.data(), model_.n)
+            .cast<double>();
+    }
+
+    Vector tau() const
+    {
+        return Eigen::Map<Eigen::Matrix<blw_real_t, Eigen::Dynamic, 1>>(state_.tau, model_.N)
+            .cast<double>();
+    }
+
+    blw_l1_info_t info{};
+
+private:
+    blw_l1_model_t          model_;
+    blw_l1_t                state_{};
+    std::vector<blw_real_t> memory_;
+};
+
+// What the library gets to see of a sample.
+Vector rounded(const Vector &zeta)
+{
+    return zeta.cast<blw_real_t>().cast<double>();
+}
+
+void check_solution(Problem &problem, Solver &solver, unsigned seed, double attack)
+{
+    const Vector zeta = rounded(problem.sample(attack));
+    const Vector x    = solver.solve(zeta);
+
+    expect(solver.info.converged, "converged", seed, solver.info.iterations);
+    if (solver.info.kalman) {
+        expect((x - problem.kalman(zeta)).norm() < tolerance, "certified estimate", seed, 0.0);
+        expect(solver.info.iterations == 0, "certificate iterates", seed, 0.0);
+        return;
+    }
+    const double violation = problem.violation(zeta, solver.tau());
+    expect(violation < tolerance, "optimality", seed, violation);
+    if (attack <= 10.0) { // beyond, Eigen's ADMM would need more passes than a test should take
+        const double error = (x - problem.solve(zeta, 4000)).norm();
+        expect(error < 10.0 * tolerance, "distance to Eigen's ADMM", seed, error);
+    }
+}
+
+// A solve cut short says how far off it may be, and that is true.
+void check_bound(Problem &problem, unsigned seed)
+{
+    for (int iterations = 1; iterations <= 8; ++iterations) {
+        Solver       cut(problem, BLW_L1_ACTIVE_SET, iterations);
+        Solver       full(problem, BLW_L1_ACTIVE_SET, 1000);
+        const Vector zeta = rounded(problem.sample(5.0));
+        const double e    = (cut.solve(zeta) - full.solve(zeta)).norm();
+        expect(std::isfinite(cut.info.bound), "bound is finite", seed, cut.info.bound);
+        expect(e <= cut.info.bound * (1.0 + tolerance) + tolerance, "error bound", seed, e);
+        expect(cut.info.iterations <= iterations, "iterations", seed, cut.info.iterations);
+    }
+}
+
+void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
+{
+    for (const double threshold : {0.3, 1.0, 3.0}) {
+        Problem problem(seed, sizes, n, threshold);
+        for (const blw_l1_engine_t engine : {BLW_L1_ACTIVE_SET, BLW_L1_ADMM}) {
+            Solver solver(problem, engine, 3000);
+            for (int k = 0; k < 6; ++k) {
+                check_solution(problem, solver, seed, (k % 3 == 2) ? 100.0 : 2.0 * k);
+            }
+        }
+        check_bound(problem, seed);
+    }
+}
+
+} // namespace
+
+int main()
+{
+    for (unsigned seed = 1; seed <= 25; ++seed) {
+        check_problem(seed, std::vector<int>(4 + seed % 12, 1), 1 + int(seed % 3));
+        std::vector<int> mixed;
+        for (unsigned g = 0; g < 4 + seed % 5; ++g) {
+            mixed.push_back((g + seed) % 3 == 0 ? 1 : 2);
+        }
+        check_problem(seed, mixed, 2 + int(seed % 2));
+        check_problem(seed, std::vector<int>(3 + seed % 4, 2), 2);
+    }
+    std::printf("%d failures\n", failures);
+    return (failures == 0) ? 0 : 1;
+}
