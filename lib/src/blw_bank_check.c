@@ -6,18 +6,18 @@ static bool sizes_ok(const blw_bank_model_t *model)
     const blw_plant_t *const plant = model->head.plant;
 
     return (plant->m <= BLW_BANK_MAX_SENSORS) && (plant->p <= BLW_BANK_MAX_ATTACKED)
-        && (model->sets >= 1U) && (model->subsets >= 1U) && (model->per_set >= 1U)
-        && (model->horizon >= 1U) && (model->warm_up >= model->horizon) && (model->filtered <= 1U);
+           && (model->sets >= 1U) && (model->subsets >= 1U) && (model->per_set >= 1U)
+           && (model->horizon >= 1U) && (model->warm_up >= model->horizon)
+           && (model->filtered <= 1U);
 }
 
 static bool averaging_ok(const blw_bank_model_t *model)
 {
     if (!(model->gain > BLW_R(0.0)) || !(model->gain <= BLW_R(1.0))
-        || !(model->ratio_max > BLW_R(1.0)) || (model->groups < 1U)) {
+        || !(model->ceiling > BLW_R(1.0)) || (model->groups < 1U)) {
         return false;
     }
-    return (model->window == 0U) ? (model->groups == 1U)
-                                 : ((model->window % model->groups) == 0U);
+    return (model->window == 0U) ? (model->groups == 1U) : ((model->window % model->groups) == 0U);
 }
 
 static bool masks_ok(const blw_plant_t *plant, const uint16_t *masks, size_t count)
@@ -97,7 +97,7 @@ blw_status_t blw_bank_check(const blw_bank_model_t *model)
         (size_t)plant->n * model->horizon * sensors_in_all(model->subset_mask, model->subsets);
 
     blw_table_add_real(&check, model->gain);
-    blw_table_add_real(&check, model->ratio_max);
+    blw_table_add_real(&check, model->ceiling);
     blw_table_add(&check, model->K, plant->n * gates);
     blw_table_add(&check, model->Z, Z_len);
     blw_table_add(&check, model->scale, pairs);

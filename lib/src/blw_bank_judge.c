@@ -75,7 +75,7 @@ static bool complete(const blw_bank_t *self, size_t subset)
     return true;
 }
 
-/* (3) over its threshold, at most ratio_max; a NaN counts as ratio_max. */
+/* (3) over its threshold; NaN or infinite if the block overflowed. */
 static blw_real_t ratio_of(const blw_bank_t *self, size_t pair, size_t oldest)
 {
     const blw_bank_model_t *const model = self->model;
@@ -90,22 +90,30 @@ static blw_real_t ratio_of(const blw_bank_t *self, size_t pair, size_t oldest)
 
         q += rho * rho;
     }
-    const blw_real_t ratio = q * model->scale[pair];
-    return (ratio <= model->ratio_max) ? ratio : model->ratio_max;
+    return q * model->scale[pair];
+}
+
+/* At most ceiling; a NaN counts as ceiling. */
+static blw_real_t limited(blw_real_t average, blw_real_t ceiling)
+{
+    return (average <= ceiling) ? average : ceiling;
 }
 
 static void average_pair(blw_bank_t *self, size_t pair, size_t oldest)
 {
     const blw_bank_model_t *const model = self->model;
     const bool                    known = complete(self, model->pair[pair]);
+    const size_t group   = (pair * model->groups) + ((size_t)self->blocks % model->groups);
+    blw_real_t  *average = &self->average[group];
 
     if (model->window != 0U) {
-        const size_t     group = (pair * model->groups) + (self->blocks % model->groups);
         const blw_real_t ratio = known ? ratio_of(self, pair, oldest) : model->start[pair];
 
-        self->average[group] += model->gain * ratio;                                      /* (5) */
+        *average = limited(*average + (model->gain * ratio), model->ceiling); /* (5) */
     } else if (known) {
-        self->average[pair] += model->gain * (ratio_of(self, pair, oldest) - self->average[pair]);
+        const blw_real_t change = ratio_of(self, pair, oldest) - *average;
+
+        *average = limited(*average + (model->gain * change), model->ceiling); /* (4) */
     } else {
         /* (4) waits for the next complete block */
     }

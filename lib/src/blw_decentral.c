@@ -7,7 +7,7 @@
 /* An innovation is cut to so many times its own threshold: squares of what follows stay finite. */
 #define INNOVATION_MAX BLW_R(3e8)
 
-/* Steps in a row without suspicion after which a filter is seeded anew. */
+/* Steps in a row without suspicion after which excluded sensors seem to tell the truth. */
 #define CALM_STEPS 4U
 
 static size_t mem_len_of(const blw_decentral_model_t *model)
@@ -169,37 +169,62 @@ static void count_passes(blw_decentral_t *self, bool pass, blw_mask_t used)
     }
 }
 
-/* An excluded sensor that agrees with the prediction again need not wait for its filter to forget
- * the attack: its state becomes that of the estimate. */
-static void reseed(blw_decentral_t *self, bool pass)
+/* Steps in a row in which no excluded sensor contradicts the prediction. */
+static void count_calm(blw_decentral_t *self)
 {
-    const blw_decentral_model_t *const model = self->model;
-    bool                               calm  = !pass;
+    const blw_decentral_sets_t *const sets = self->model->sets;
+    bool                              calm = self->set != 0U;
 
-    for (size_t rest = self->set; rest != 0U; rest = model->sets->parent[rest]) {
-        calm = calm && (self->suspicion[model->sets->sensor[rest]] <= BLW_R(0.5));
+    for (size_t rest = self->set; rest != 0U; rest = sets->parent[rest]) {
+        calm = calm && (self->suspicion[sets->sensor[rest]] <= BLW_R(0.5));
     }
-    self->calm = calm ? (uint16_t)(self->calm + 1U) : 0U;
-    if (self->calm >= CALM_STEPS) {
-        blw_decentral_leave_out(self, self->set);
-        blw_la_copy(model->mu, self->z, self->delta);
+    if (!calm) {
         self->calm = 0U;
+    } else if (self->calm < CALM_STEPS) {
+        self->calm++;
     }
 }
 
-static blw_outcome_t search(blw_decentral_t *self, blw_mask_t silent, uint16_t *compared)
+/* The filter of an excluded sensor need not forget the attack: its state becomes the estimate's. */
+static void reseed(blw_decentral_t *self)
 {
-    const blw_decentral_model_t *const model  = self->model;
-    const bool                         spare  = blw_mask_count(silent) < model->head.plant->p;
-    const size_t                       best   = blw_decentral_search(self, spare ? silent : 0U,
-                                                                     compared);
-    const blw_real_t                   g      = blw_decentral_statistic(self, best);
+    blw_decentral_leave_out(self, self->set);
+    blw_la_copy(self->model->mu, self->z, self->delta);
+    self->calm = 0U;
+}
+
+/* Leave out sensors that fell silent, unless an attacked one is: silence is no lie. */
+static void leave_out_silent(blw_decentral_t *self, blw_mask_t silent)
+{
+    const blw_decentral_sets_t *const sets = self->model->sets;
+    const bool                        free = (self->set == 0U) || (self->calm >= CALM_STEPS);
+
+    if (free && self->usable
+        && ((silent & ~blw_decentral_members(sets, self->set)) != 0U)) {
+        exclude(self, blw_decentral_cover(sets, silent));
+    }
+}
+
+/* Silent sensors that a new set has to contain: all of them while that leaves one to spare for an
+ * attack, else those that are left out already. */
+static blw_mask_t needed_of(const blw_decentral_t *self, blw_mask_t silent)
+{
+    const bool spare = blw_mask_count(silent) < self->model->head.plant->p;
+
+    return spare ? silent : (silent & blw_decentral_members(self->model->sets, self->set));
+}
+
+static blw_outcome_t search(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared)
+{
+    const size_t     best = blw_decentral_search(self, needed, compared);
+    const blw_real_t g    = blw_decentral_statistic(self, best);
 
     if (best != self->set) {
         exclude(self, best);
     }
     blw_decentral_estimate(self, best);
-    return (g <= blw_decentral_threshold(model, best)) ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_HELD;
+    return (g <= blw_decentral_threshold(self->model, best)) ? BLW_OUTCOME_CONVERGED
+                                                             : BLW_OUTCOME_HELD;
 }
 
 static bool warming_up(const blw_decentral_t *self)
@@ -214,9 +239,7 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
     const blw_mask_t                   silent = silent_sensors(self);
 
     out->threshold = blw_decentral_threshold(model, 0U);
-    if ((self->set == 0U) && (silent != 0U) && self->usable) {
-        exclude(self, blw_decentral_cover(model->sets, silent));
-    }
+    leave_out_silent(self, silent);
     const blw_real_t g = blw_decentral_statistic(self, self->set);
     blw_decentral_estimate(self, self->set);
     out->statistic = (self->set == 0U) ? g : blw_decentral_all_statistic(self, self->set);
@@ -231,10 +254,12 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
         blw_decentral_estimate(self, 0U);
         return BLW_OUTCOME_KALMAN;
     }
-    if (g <= blw_decentral_threshold(model, self->set)) {
+    const blw_mask_t needed  = needed_of(self, silent);
+    const bool       covered = (needed & ~blw_decentral_members(model->sets, self->set)) == 0U;
+    if (covered && (g <= blw_decentral_threshold(model, self->set))) {
         return (self->set == 0U) ? BLW_OUTCOME_KALMAN : BLW_OUTCOME_CONVERGED;
     }
-    return search(self, silent, &out->iterations);
+    return search(self, needed, &out->iterations);
 }
 
 /* (2), or the prediction if the fusion overflows. */
@@ -290,8 +315,10 @@ blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, cons
     blw_decentral_advance(self);
     const blw_outcome_t outcome = decide(self, used, out);
     used = update(self, used);
-    if ((self->model->reseed != 0U) && (self->set != 0U)) {
-        reseed(self, out->statistic <= out->threshold);
+    count_calm(self);
+    if ((self->model->reseed != 0U) && (self->calm >= CALM_STEPS)
+        && !(out->statistic <= out->threshold)) {
+        reseed(self);
     }
     report(self, outcome, used, out);
     return BLW_OK;

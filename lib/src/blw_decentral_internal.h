@@ -26,6 +26,8 @@ blw_mask_t blw_decentral_members(const blw_decentral_sets_t *sets, size_t set);
 size_t blw_decentral_rows(const blw_decentral_model_t *model, size_t set);
 /** Threshold of the statistic of the sensors that are not in a set. */
 blw_real_t blw_decentral_threshold(const blw_decentral_model_t *model, size_t set);
+/** g + c(g): the smallest one is the most plausible. */
+blw_real_t blw_decentral_score(const blw_decentral_model_t *model, size_t set, blw_real_t g);
 /** The set that covers most of the given sensors, and of those the one with the fewest others. */
 size_t blw_decentral_cover(const blw_decentral_sets_t *sets, blw_mask_t sensors);
 /** The candidate with the most plausible statistic among those that contain the sensors of

@@ -71,7 +71,7 @@ static blw_real_t offset_of(const blw_decentral_ranking_t *ranking, size_t place
     return c[i] + (((c[i + 1U] - c[i]) * (g - knots[i])) / (knots[i + 1U] - knots[i]));
 }
 
-static blw_real_t score_of(const blw_decentral_model_t *model, size_t set, blw_real_t g)
+blw_real_t blw_decentral_score(const blw_decentral_model_t *model, size_t set, blw_real_t g)
 {
     if (model->ranking->n_ranked == 0U) {
         return g;
@@ -92,7 +92,7 @@ size_t blw_decentral_search(blw_decentral_t *self, blw_mask_t needed, uint16_t *
             continue;
         }
         const blw_real_t score =
-            score_of(self->model, set, blw_decentral_statistic(self, set));
+            blw_decentral_score(self->model, set, blw_decentral_statistic(self, set));
         if ((*compared == 0U) || (score < low)) {
             low  = score;
             best = set;

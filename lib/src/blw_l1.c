@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Secure fusion of local estimates: certificate, choice of engine, exit report.  See blw_l1.h for the
- * problem and its equation numbers.  The gap at nu with multipliers l = Z z is, for any t in [0, 1]
+/* Secure fusion of local estimates: certificate, choice of engine, exit report.  See blw_l1.h for
+ * the problem and its equation numbers.  The gap at nu with multipliers l = Z z is, for any t in [0, 1]
  * that makes t l feasible for the dual,
  *     gap = sum_g (c_g |nu_g| - t l_g' nu_g) + (1 - t)^2 |z|^2 / 2,                          (5)
  * and since (2) is strongly convex in z,  |z - z*| <= e = sqrt(2 gap).  The minimisers differ by
@@ -116,7 +116,7 @@ static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info
             gap -= t * self->l[i] * (zeta[i] - self->tau[i]);
         }
     }
-    info->gap = blw_la_max(gap, BLW_R(0.0));
+    info->gap                = blw_la_max(gap, BLW_R(0.0));
     const blw_real_t e       = blw_la_sqrt(BLW_R(2.0) * info->gap);
     const blw_real_t z_least = blw_la_max(z - e, BLW_R(0.0));
     const blw_real_t best    = sum + (BLW_R(0.5) * ((z * z) - (z_least * z_least)));

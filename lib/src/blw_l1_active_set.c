@@ -5,8 +5,8 @@
  * objective never rises; the end is verified with z and l formed anew from tau. */
 #include "blw_l1_internal.h"
 
-/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end; and
- * low enough for either if full passes do not lower it any more, because the rounding of tau turns
+/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end;
+ * and low enough for either if full passes do not lower it any more, because the rounding of tau turns
  * the direction of a very short nu_g. */
 #define RESIDUAL_ENTER   BLW_R(1e-4)
 #define RESIDUAL_FINAL   (BLW_R(4.0) * BLW_L1_SLACK)
@@ -62,10 +62,10 @@ static void nu_after(const blw_l1_t *self, const blw_real_t *zeta, size_t k, siz
 /* Slope of the objective along the step at alpha. */
 static blw_real_t slope(const blw_l1_t *self, const blw_real_t *zeta, blw_real_t alpha)
 {
-    const blw_l1_model_t *const m   = self->model;
-    size_t                      r   = 0U;
-    blw_real_t                  sum = blw_la_dot(m->d, self->z, self->dz)
-                     + (alpha * blw_la_dot(m->d, self->dz, self->dz));
+    const blw_l1_model_t *const m = self->model;
+    size_t                      r = 0U;
+    blw_real_t                  sum =
+        blw_la_dot(m->d, self->z, self->dz) + (alpha * blw_la_dot(m->d, self->dz, self->dz));
 
     for (size_t k = 0U; k < self->n_A; k++) {
         const size_t g    = blw_l1_member(self, k);
@@ -93,9 +93,10 @@ static size_t vanished_pair(const blw_l1_t *self, const blw_real_t *zeta, blw_re
         const size_t size = blw_l1_size(self->model, g);
         blw_real_t   nu[2];
         nu_after(self, zeta, k, r, alpha, nu);
-        const blw_real_t share = blw_la_norm(2U, nu) / blw_l1_nu_norm(self, zeta, g);
-        if ((size == 2U) && (share < least)) {
-            least = share;
+        const blw_real_t before = blw_l1_nu_norm(self, zeta, g);
+        const blw_real_t after  = blw_la_norm(2U, nu);
+        if ((size == 2U) && (after < (least * before))) {
+            least = after / before;
             found = k;
         }
         r += size;
@@ -127,8 +128,8 @@ static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
     pass->blocked = vanished_pair(self, zeta, pass->alpha);
 }
 
-/* Drop every pair for which nu_g = 0 is the best with all others fixed, |l_g + Z_g Z_g' nu_g| <= c_g,
- * or that rounding has brought there. */
+/* Drop every pair for which nu_g = 0 is the best with all others fixed,
+ * |l_g + Z_g Z_g' nu_g| <= c_g, or that rounding has brought there. */
 static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
 {
     const blw_l1_model_t *const m       = self->model;
@@ -141,12 +142,13 @@ static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
         bool         drop = false;
         if (blw_l1_size(m, g) == 2U) {
             size_t                  len[2];
-            const blw_real_t *const row[2] = {blw_l1_row(m, i, &len[0]), blw_l1_row(m, i + 1U, &len[1])};
-            const blw_real_t        nu[2]  = {zeta[i] - self->tau[i], zeta[i + 1U] - self->tau[i + 1U]};
-            const blw_real_t        S01    = blw_la_dot(len[0], row[0], row[1]);
-            const blw_real_t        l[2]   = {
-                self->l[i] + (blw_la_dot(len[0], row[0], row[0]) * nu[0]) + (S01 * nu[1]),
-                self->l[i + 1U] + (S01 * nu[0]) + (blw_la_dot(len[1], row[1], row[1]) * nu[1])};
+            const blw_real_t *const row[2] = {blw_l1_row(m, i, &len[0]),
+                                              blw_l1_row(m, i + 1U, &len[1])};
+            const blw_real_t nu[2] = {zeta[i] - self->tau[i], zeta[i + 1U] - self->tau[i + 1U]};
+            const blw_real_t S01   = blw_la_dot(len[0], row[0], row[1]);
+            const blw_real_t l[2]  = {
+                 self->l[i] + (blw_la_dot(len[0], row[0], row[0]) * nu[0]) + (S01 * nu[1]),
+                 self->l[i + 1U] + (S01 * nu[0]) + (blw_la_dot(len[1], row[1], row[1]) * nu[1])};
             drop = (blw_la_norm(2U, l) <= m->c[g]) || (blw_la_norm(2U, nu) <= BLW_R(0.0));
         }
         if (drop) {
@@ -206,20 +208,22 @@ static pass_t descend(blw_l1_t *self, const blw_real_t *zeta)
     return pass;
 }
 
-/* (4) with z and l formed anew from tau, after one last correction, whose effect on x_hat becomes
- * the error bound. */
+/* (4) with z and l formed anew from tau, after one last correction.  What the next one would change
+ * in x_hat becomes the error bound. */
 static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *bound)
 {
     blw_l1_project(self->model, self->tau, self->z);
     blw_l1_multipliers(self);
     const pass_t pass = descend(self, zeta);
-    *bound            = blw_l1_support_effect(self);
     blw_l1_multipliers(self);
+    blw_l1_support_newton(self);
+    *bound = blw_l1_support_effect(self);
     return (pass.blocked == self->n_A) && (blw_l1_support_residual(self) <= RESIDUAL_STALLED)
            && (blw_l1_worst(self) == self->model->n_groups);
 }
 
-/* Whether the residual is below a limit, or stalled: no longer halved by a full pass on the same A. */
+/* Whether the residual is below a limit, or stalled: no longer halved by a full pass on the same
+ * A. */
 static bool low(blw_real_t residual, blw_real_t before, blw_real_t limit)
 {
     return (residual <= limit)
@@ -229,7 +233,7 @@ static bool low(blw_real_t residual, blw_real_t before, blw_real_t limit)
 void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
     const size_t none   = self->model->n_groups;
-    blw_real_t   before = BLW_REAL_MAX;   /* residual before the last pass, if that was a full one */
+    blw_real_t   before = BLW_REAL_MAX; /* residual before the last pass, if that was a full one */
     blw_real_t   enough = RESIDUAL_ENTER; /* residual below which a group may enter */
 
     blw_l1_multipliers(self);

@@ -4,8 +4,9 @@
  *     v  = alpha nu + (1 - alpha) t + u                                                      (2)
  *     t_g = (1 - (c_g / rho) / |v_g|)_+ v_g,   u = v - t                                     (3)
  * Boyd et al. 2011, (3.5)-(3.7) and section 3.4.3.  Between passes tau = zeta - t, dir = u,
- * l = S zeta, and nu uses the memory of A and L, which are adjacent and free meanwhile.  Once the residuals are small the support of t goes to the active set, which verifies
- * or corrects it; so what is returned as converged is exact, whatever the engine. */
+ * l = S zeta, and nu uses the memory of A and L, which are adjacent and free meanwhile.  Once the
+ * residuals are small the support of t goes to the active set, which verifies or corrects it; so
+ * what is returned as converged is exact, whatever the engine. */
 #include "blw_l1_internal.h"
 
 #define ALPHA BLW_R(1.6)
@@ -34,14 +35,15 @@ static void start(blw_l1_t *self, const blw_real_t *zeta)
 }
 
 /* (3) for group g, v of (2) in v[].  @return largest change of t. */
-static blw_real_t shrink_group(blw_l1_t *self, const blw_real_t *zeta, size_t g, const blw_real_t *v)
+static blw_real_t shrink_group(blw_l1_t *self, const blw_real_t *zeta, size_t g,
+                               const blw_real_t *v)
 {
-    const blw_l1_model_t *const m      = self->model;
-    const size_t                i      = m->first[g];
-    const size_t                size   = blw_l1_size(m, g);
-    const blw_real_t            norm   = (size == 1U) ? blw_la_abs(v[0]) : blw_la_norm(2U, v);
-    const blw_real_t            kappa  = m->c[g] / m->rho;
-    const blw_real_t            keep   = (norm > kappa) ? (BLW_R(1.0) - (kappa / norm)) : BLW_R(0.0);
+    const blw_l1_model_t *const m     = self->model;
+    const size_t                i     = m->first[g];
+    const size_t                size  = blw_l1_size(m, g);
+    const blw_real_t            norm  = (size == 1U) ? blw_la_abs(v[0]) : blw_la_norm(2U, v);
+    const blw_real_t            kappa = m->c[g] / m->rho;
+    const blw_real_t            keep  = (norm > kappa) ? (BLW_R(1.0) - (kappa / norm)) : BLW_R(0.0);
     blw_real_t                  change = BLW_R(0.0);
 
     for (size_t j = 0U; j < size; j++) {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 /* The support A of nu and the factor L of its normal matrix.
- *     H = Z_A Z_A' + K,   K = blockdiag((c_g / |nu_g|) (I - dir dir')) on pairs, 0 elsewhere     (1)
+ *     H = Z_A Z_A' + K,   K = blockdiag((c_g / |nu_g|) (I - dir dir')) on pairs, 0 elsewhere (1)
  * is the Hessian of (2) in blw_l1.h on A.  Without pairs H changes by one row at a time, and L with
- * it.  The residual c dir - l of a Newton step is always formed from Z, never from H, so an error in
- * L slows convergence and does no other harm. */
+ * it.  The residual c dir - l of a Newton step is always formed from Z, never from H, so an error
+ * in L slows convergence and does no other harm. */
 #include "blw_l1_internal.h"
 
 /* Least pivot: a row of Z has unit norm, so below it the row depends on those before it.  The step
@@ -168,7 +168,7 @@ void blw_l1_support_factor(blw_l1_t *self, const blw_real_t *zeta)
         const blw_real_t diagonal = H[r];
         blw_la_solve_lower(r, self->L, H);
         const blw_real_t pivot2 = diagonal - blw_la_dot(r, H, H);
-        H[r] = blw_la_sqrt(blw_la_max(pivot2, PIVOT_MIN * PIVOT_MIN));
+        H[r]                    = blw_la_sqrt(blw_la_max(pivot2, PIVOT_MIN * PIVOT_MIN));
     }
 }
 

@@ -9,13 +9,15 @@
 
 #include "blw/blw_l1.h"
 
-namespace reference {
+namespace reference
+{
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 // The tables of one instance of (1) in blw_l1.h, in double and as the library takes them.
-class Problem {
+class Problem
+{
 public:
     // sizes: rows of every group, 1 or 2; n states.
     Problem(unsigned seed, const std::vector<int> &sizes, int n, double threshold)
@@ -46,7 +48,7 @@ public:
     Vector sample(double attack)
     {
         const Eigen::LLT<Matrix> W(W_);
-        Vector zeta = G_ * normal(n_, 1) + W.matrixL() * normal(N_, 1);
+        Vector                   zeta = G_ * normal(n_, 1) + W.matrixL() * normal(N_, 1);
         zeta.head(N_ / 4) += attack * normal(N_ / 4, 1);
         return zeta;
     }
@@ -54,17 +56,18 @@ public:
     // (2) by ADMM in double, started cold: an algorithm and a linear algebra of its own.
     Vector solve(const Vector &zeta, int passes) const
     {
-        const Matrix S   = Z_ * Z_.transpose();
-        const double rho = 0.3;
+        const Matrix             S   = Z_ * Z_.transpose();
+        const double             rho = 0.3;
         const Eigen::LLT<Matrix> M(S + rho * Matrix::Identity(N_, N_));
-        Vector t = Vector::Zero(N_);
-        Vector u = Vector::Zero(N_);
+        Vector                   t = Vector::Zero(N_);
+        Vector                   u = Vector::Zero(N_);
         for (int pass = 0; pass < passes; ++pass) {
             const Vector nu = M.solve(S * zeta + rho * (t - u));
             const Vector v  = 1.6 * nu - 0.6 * t + u;
             for (Eigen::Index g = 0; g < c_.size(); ++g) {
                 const auto   rows = v.segment(first(g), size(g));
-                const double keep = std::max(0.0, 1.0 - c_(g) / rho / std::max(rows.norm(), 1e-300));
+                const double keep =
+                    std::max(0.0, 1.0 - c_(g) / rho / std::max(rows.norm(), 1e-300));
                 t.segment(first(g), size(g)) = keep * rows;
             }
             u = v - t;
@@ -109,13 +112,28 @@ public:
         return m;
     }
 
-    int rows() const { return N_; }
-    int states() const { return n_; }
-    Vector kalman(const Vector &zeta) const { return F_ * zeta; }
+    int rows() const
+    {
+        return N_;
+    }
+    int states() const
+    {
+        return n_;
+    }
+    Vector kalman(const Vector &zeta) const
+    {
+        return F_ * zeta;
+    }
 
 private:
-    Eigen::Index first(Eigen::Index g) const { return first_[static_cast<size_t>(g)]; }
-    Eigen::Index size(Eigen::Index g) const { return first_[static_cast<size_t>(g) + 1] - first(g); }
+    Eigen::Index first(Eigen::Index g) const
+    {
+        return first_[static_cast<size_t>(g)];
+    }
+    Eigen::Index size(Eigen::Index g) const
+    {
+        return first_[static_cast<size_t>(g) + 1] - first(g);
+    }
 
     // Z, F for rows scaled so that Z Z' has unit mean square over every group.
     void reduce()
@@ -128,17 +146,17 @@ private:
             const double trace = S.diagonal().segment(first(g), size(g)).sum();
             s.segment(first(g), size(g)).setConstant(std::sqrt(trace / double(size(g))));
         }
-        const Eigen::JacobiSVD<Matrix> svd(S, Eigen::ComputeFullU);
-        const int    d    = N_ - n_;
-        const Matrix root = svd.matrixU().leftCols(d)
-                            * svd.singularValues().head(d).cwiseSqrt().asDiagonal();
-        const Matrix scaled = s.cwiseInverse().asDiagonal() * root;
+        const Eigen::SelfAdjointEigenSolver<Matrix> eigen(S);
+        const int                                   d    = N_ - n_;
+        const Matrix                                root = eigen.eigenvectors().rightCols(d)
+                            * eigen.eigenvalues().tail(d).cwiseSqrt().asDiagonal();
+        const Matrix                       scaled = s.cwiseInverse().asDiagonal() * root;
         const Eigen::HouseholderQR<Matrix> qr(scaled.topRows(d).transpose());
-        const Matrix Q = qr.householderQ();
-        Z_             = scaled * Q;
-        G_             = s.asDiagonal() * G_;
-        W_             = s.asDiagonal() * W_ * s.asDiagonal();
-        F_             = P * G_.transpose() * W_.inverse();
+        const Matrix                       Q = qr.householderQ();
+        Z_                                   = scaled * Q;
+        G_                                   = s.asDiagonal() * G_;
+        W_                                   = s.asDiagonal() * W_ * s.asDiagonal();
+        F_                                   = P * G_.transpose() * W_.inverse();
     }
 
     void convert()
@@ -165,10 +183,12 @@ private:
             c_table_.push_back(static_cast<blw_real_t>(c_(g)));
             rows_c.segment(first(g), size(g)).setConstant(c_(g));
         }
-        const Matrix cG  = rows_c.asDiagonal() * G_;
-        const Matrix cWZ = rows_c.asDiagonal() * W_ * Z_;
-        kappa_G_         = 1.0 / cG.jacobiSvd().singularValues().minCoeff();
-        kappa_W_ = std::sqrt(double(c_.size())) * cWZ.jacobiSvd().singularValues().maxCoeff();
+        const Matrix                                cG  = rows_c.asDiagonal() * G_;
+        const Matrix                                cWZ = rows_c.asDiagonal() * W_ * Z_;
+        const Eigen::SelfAdjointEigenSolver<Matrix> squares_G(cG.transpose() * cG);
+        const Eigen::SelfAdjointEigenSolver<Matrix> squares_W(cWZ.transpose() * cWZ);
+        kappa_G_ = 1.0 / std::sqrt(squares_G.eigenvalues().minCoeff());
+        kappa_W_ = std::sqrt(double(c_.size()) * squares_W.eigenvalues().maxCoeff());
     }
 
     std::mt19937            random_;

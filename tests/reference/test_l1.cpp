@@ -5,7 +5,8 @@
 
 #include "random_l1.h"
 
-namespace {
+namespace
+{
 
 using reference::Problem;
 using reference::Vector;
@@ -24,7 +25,8 @@ constexpr bool   is_double = (sizeof(blw_real_t) == 8);
 constexpr double tolerance = is_double ? 1e-9 : 3e-3; // relative to thresholds of size 1
 
 // The library on one problem; holds state and memory, so that solves start warm.
-class Solver {
+class Solver
+{
 public:
     Solver(const Problem &problem, blw_l1_engine_t engine, int max_iterations)
         : model_(problem.model(engine, max_iterations)),

@@ -4,11 +4,11 @@
 #include "support.h"
 
 #include "blw/blw_l1.h"
+#include "blw_la.h"
 
 /* (S + rho I)^-1 for S = I - 1 1'/3, rho = 1/2: 2/3 I + 4/9 1 1', packed lower. */
 static const blw_real_t M_half[6] = {
-    BLW_R(1.1111111111111112),
-    BLW_R(0.4444444444444444), BLW_R(1.1111111111111112),
+    BLW_R(1.1111111111111112), BLW_R(0.4444444444444444), BLW_R(1.1111111111111112),
     BLW_R(0.4444444444444444), BLW_R(0.4444444444444444), BLW_R(1.1111111111111112),
 };
 
@@ -46,6 +46,9 @@ static void test_solve_given_agreeing_rows_returns_the_linear_fusion(void)
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.75, info.statistic);
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.5, x[0]);
     TEST_ASSERT_REAL_WITHIN(0.0, 0.0, info.bound);
+    blw_real_t fused[1];
+    blw_la_gemv(1U, 3U, made.l1.F, zeta, fused);
+    TEST_ASSERT_EQUAL_MEMORY(fused, x, sizeof x); /* bit for bit the weighted sum */
 }
 
 /* Huber: clip(4 - mu) + clip(5 - mu) + clip(90 - mu) = 0 at mu = 5, x = mu / 2. */
@@ -85,7 +88,7 @@ static void test_solve_given_a_huge_outlier_loses_no_accuracy(void)
 
 static void test_solve_given_the_next_sample_starts_from_the_support(void)
 {
-    const blw_real_t next[3] = {BLW_R(4.5), BLW_R(5.0), BLW_R(95.0)};
+    const blw_real_t next[3]   = {BLW_R(4.5), BLW_R(5.0), BLW_R(95.0)};
     const blw_real_t turned[3] = {BLW_R(4.0), BLW_R(5.0), BLW_R(-80.0)};
 
     check_one_outlier();
@@ -127,7 +130,8 @@ static void test_excess_given_an_outlier_names_its_row(void)
     blw_l1_solve(&l1, zeta, x, &info);
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 1.0, blw_l1_excess(&l1, zeta, 0U, 1U)); /* 5 - 4 */
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, blw_l1_excess(&l1, zeta, 1U, 1U));
-    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL * 85.0, 85.0, blw_l1_excess(&l1, zeta, 2U, 1U)); /* 90 - 5 */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL * 85.0, 85.0,
+                            blw_l1_excess(&l1, zeta, 2U, 1U)); /* 90 - 5 */
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL * 85.0, 85.0, blw_l1_excess(&l1, zeta, 0U, 3U));
 }
 
@@ -146,20 +150,20 @@ static void test_check_given_a_sound_model_accepts_both_engines(void)
     TEST_ASSERT_EQUAL_INT(BLW_OK, check());
 }
 
-#define ASSERT_REFUSED(fault)                              \
-    do {                                                   \
-        support_lasso_make(&made, BLW_METHOD_LASSO);       \
-        fault;                                             \
-        TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, check());     \
+#define ASSERT_REFUSED(fault) \
+    do { \
+        support_lasso_make(&made, BLW_METHOD_LASSO); \
+        fault; \
+        TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, check()); \
     } while (0)
 
 static void test_check_given_each_fault_refuses(void)
 {
-    static const uint16_t   late[4]    = {1U, 1U, 2U, 3U};
-    static const uint16_t   empty[4]   = {0U, 1U, 1U, 3U};
-    static const uint16_t   three[2]   = {0U, 3U};
-    static const uint16_t   beyond[4]  = {0U, 1U, 2U, 4U};
-    static const blw_real_t zero_c[3]  = {BLW_R(1.0), BLW_R(0.0), BLW_R(1.0)};
+    static const uint16_t   late[4]   = {1U, 1U, 2U, 3U};
+    static const uint16_t   empty[4]  = {0U, 1U, 1U, 3U};
+    static const uint16_t   three[2]  = {0U, 3U};
+    static const uint16_t   beyond[4] = {0U, 1U, 2U, 4U};
+    static const blw_real_t zero_c[3] = {BLW_R(1.0), BLW_R(0.0), BLW_R(1.0)};
 
     ASSERT_REFUSED(made.l1.d = 0U);
     ASSERT_REFUSED(made.l1.N = 4U);

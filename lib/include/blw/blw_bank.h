@@ -2,24 +2,26 @@
 /** @file blw_bank.h  Secure estimation by a bank of Kalman filters: method `bank`.
  *
  *  One filter for every set s of all sensors but p, so that one of them is free of attack:
- *      x_s(k) = x_bar_s(k) + K_s (y_s(k) - C_s x_bar_s(k)),  x_bar_s(k) = A x_s(k-1) + Bu u(k-1)  (1)
- *  Every subset i of s that leaves out 2 p sensors also yields x from the h samples of a block alone:
- *      x_i(t) = Z_i Y_i(t),   Y_i(t) = (y_i(t), ..., y_i(t+h-1)) less the part of u               (2)
- *      q_si(t) = |x_i(t) - x_s(t)|^2,   t = k-h+1                                                (3)
+ *      x_bar_s(k) = A x_s(k-1) + Bu u(k-1),  x_s(k) = x_bar_s + K_s (y_s(k) - C_s x_bar_s)     (1)
+ *  Every subset i of s that leaves out 2 p sensors yields x from the h samples of a block alone:
+ *      x_i(t) = Z_i Y_i(t),   Y_i(t) = (y_i(t), ..., y_i(t+h-1)) less the part of u           (2)
+ *      q_si(t) = |x_i(t) - x_s(t)|^2,   t = k-h+1                                             (3)
  *  The set passes if for all its subsets the average of q_si is at most what it is without attack,
  *  plus epsilon: [B] Algorithm 2.  The estimate is that of the passing set with the least P_opt; if
  *  none passes the last choice is kept and the outcome is BLW_OUTCOME_HELD.  The average is
- *      exponentially weighted, decided in every step (window = 0), or                            (4)
- *      the mean of one window of blocks, decided at its end for the next one.                    (5)
+ *      exponentially weighted, and decides in every step (window = 0), or                     (4)
+ *      the mean of one window of blocks, and decides at its end for the next one.             (5)
+ *  So that the first steps of a gross attack do no harm, a set whose innovations (1) are beyond the
+ *  gate does not pass in that step either; this test is not in [B].
  *
  *  All of it runs relative to one reference trajectory x_ref, the estimate itself: the filters keep
  *  d_s = x_s - x_ref, the blocks hold innovations of x_ref.  So the residues stay at noise size
  *  whatever the operating point, and u enters in the reference only.
  *
- *  A missing sample leaves its innovation out of (1); a block that lacks a sample of i is left out of
- *  the average (4) and counts as its benign mean in (5).  Among passing sets, those that lack fewest
- *  samples now come first.  One block counts at most ratio_max times the threshold, so that an average
- *  recovers from any spike in a bounded number of steps.
+ *  A missing sample leaves its innovation out of (1); a block that lacks a sample of i is left out
+ *  of the average (4) and counts as its benign mean in (5).  Among passing sets, those that lack
+ *  fewest samples now come first.  An average stops at the ceiling, so that it recovers from any
+ *  attack in a bounded number of steps.
  */
 #ifndef BLW_BANK_H
 #define BLW_BANK_H
@@ -38,7 +40,7 @@ typedef struct blw_bank_model {
     uint8_t           subsets;     /**< different subsets, >= 1 */
     uint8_t           per_set;     /**< subsets in a set, >= 1 */
     uint8_t           horizon;     /**< h, samples in a block, >= 1 */
-    uint8_t           groups;      /**< averages of a pair: 1, or with a window [B]'s groups of blocks */
+    uint8_t           groups;      /**< averages of a pair, >= 1; more only with a window */
     uint8_t           filtered;    /**< 1: x_s of (1) is tested and returned; 0: x_bar_s */
     uint16_t          window;      /**< blocks in a window, a multiple of groups; 0: average (4) */
     uint16_t          warm_up;     /**< step of the first test, >= horizon */
@@ -46,7 +48,7 @@ typedef struct blw_bank_model {
     const uint16_t   *subset_mask; /**< [subsets] sensors of a subset */
     const uint16_t   *pair;        /**< [sets x per_set] the subsets of every set */
     blw_real_t        gain;        /**< weight of one block in the average, (0, 1] */
-    blw_real_t        ratio_max;   /**< q over its threshold counts up to here, > 1 */
+    blw_real_t        ceiling;   /**< no average rises above it, > 1 */
     const blw_real_t *K;           /**< [sets][n x size of the set] gains */
     const blw_real_t *Z;           /**< [subsets][n x h size of the subset] left inverses */
     const blw_real_t *scale;       /**< [sets x per_set] 1 / threshold of the average, > 0 */
@@ -91,12 +93,13 @@ blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model, blw_
                            size_t mem_len);
 /** As blw_estimator_ops.reset. */
 blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0);
-/** As blw_estimator_ops.step.  out->statistic is the largest average of all sets over its threshold,
- *  so it exceeds out->threshold = 1 while any set fails; a sensor's suspicion comes from the best set
- *  that holds it; out->excluded is never empty if p > 0, since a set leaves p sensors out.
+/** As blw_estimator_ops.step.  out->statistic is what speaks most against any set, so it exceeds
+ *  out->threshold = 1 as long as a set fails; a sensor's suspicion comes from the best set that
+ *  holds it.  Every set leaves p sensors out, but out->excluded holds only those that no passing set
+ *  holds, or with BLW_OUTCOME_HELD those that the last choice leaves out.
  *  With s = |set|, theta = |subset|, the same whatever the data:
- *  n (n + l + m) + sum over sets n (n + 2 s) + h n (n + m) + sum over subsets h n theta
- *  + sets per_set (n + 2) multiply-adds. */
+ *      n (n + l + m) + sum over sets (n n + 2 s (n + 1)) + h n (n + m) + sum over subsets h n theta
+ *      + sets per_set (n + 2) multiply-adds. */
 blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real_t *y,
                            blw_mask_t valid, blw_estimator_out_t *out);
 

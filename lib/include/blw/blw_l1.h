@@ -49,17 +49,17 @@ typedef struct blw_l1_model {
 /** Solver state: the support A found last, from which the next solve starts. */
 typedef struct blw_l1 {
     const blw_l1_model_t *model;
-    blw_real_t           *tau;    /* [N] zeta - nu */
-    blw_real_t           *l;      /* [N] multipliers (3) */
-    blw_real_t           *dir;    /* [N] nu_g / |nu_g| on A; scaled dual of ADMM while that runs */
-    blw_real_t           *step;   /* [N] steps of tau, first rows of A, then unused */
-    blw_real_t           *z;      /* [d] Z' tau */
-    blw_real_t           *dz;     /* [d] Z' step */
-    blw_real_t           *L;      /* packed lower: L L' = Z_A Z_A', plus curvature of pairs */
-    blw_real_t           *A;      /* [n_groups] groups of the support in the order of L: small
+    blw_real_t           *tau;  /* [N] zeta - nu */
+    blw_real_t           *l;    /* [N] multipliers (3) */
+    blw_real_t           *dir;  /* [N] nu_g / |nu_g| on A; scaled dual of ADMM while that runs */
+    blw_real_t           *step; /* [N] steps of tau, first rows of A, then unused */
+    blw_real_t           *z;    /* [d] Z' tau */
+    blw_real_t           *dz;   /* [d] Z' step */
+    blw_real_t           *L;    /* packed lower: L L' = Z_A Z_A', plus curvature of pairs */
+    blw_real_t           *A;    /* [n_groups] groups of the support in the order of L: small
                                      integers, exact in blw_real_t */
-    uint16_t              n_A;    /* groups in A */
-    uint16_t              rows;   /* rows of the groups in A = order of L */
+    uint16_t              n_A;  /* groups in A */
+    uint16_t              rows; /* rows of the groups in A = order of L */
 } blw_l1_t;
 
 typedef struct blw_l1_info {
@@ -81,8 +81,8 @@ typedef struct blw_l1_info {
 #define BLW_L1_ROWS(N, d, n_groups) (((n_groups) == (N)) ? ((size_t)(d) + 1U) : (size_t)(N))
 
 /** Number of blw_real_t that init() needs, whatever the engine. */
-#define BLW_L1_MEM(N, d, n_groups)                                                                 \
-    ((4U * (size_t)(N)) + (2U * (size_t)(d)) + (size_t)(n_groups)                                  \
+#define BLW_L1_MEM(N, d, n_groups) \
+    ((4U * (size_t)(N)) + (2U * (size_t)(d)) + (size_t)(n_groups) \
      + ((BLW_L1_ROWS(N, d, n_groups) * (BLW_L1_ROWS(N, d, n_groups) + 1U)) / 2U))
 
 /** Add the tables to a walk and check dimensions, groups, signs and the engine. */

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: MIT */
+/* blw_sim: the library's estimators on simulated and on recorded measurements. */
+#include "commands.h"
+#include "error.h"
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <new>
+
+namespace
+{
+
+const int FAILED    = 1;
+const int BAD_INPUT = 2;
+
+void add_common(CLI::App &command, sim::Options &options)
+{
+    command.add_option("--design", options.design, "NAME.json of tools/bulwark design")->required();
+    command.add_option("--out", options.out, "Folder for the results")->required();
+    command
+        .add_option("--method", options.methods,
+                    "Methods to run beside kalman and oracle; all = every one designed")
+        ->delimiter(',')
+        ->default_val(std::vector<std::string>{"all"});
+    command.add_option("--seed", options.seed, "Seed of the random numbers")
+        ->check(CLI::NonNegativeNumber);
+    command.add_flag("--json", options.json, "Print summary.json instead of a table");
+}
+
+CLI::App *add_run(CLI::App &app, sim::Options &options)
+{
+    CLI::App *run = app.add_subcommand("run", "Simulate a scenario");
+    run->add_option("scenario", options.input, "SCENARIO.toml")->required();
+    add_common(*run, options);
+    run->add_option("--runs", options.runs, "Number of runs, each with its own seed")
+        ->check(CLI::Range(1, 1000000));
+    return run;
+}
+
+CLI::App *add_replay(CLI::App &app, sim::Options &options)
+{
+    CLI::App *replay = app.add_subcommand("replay", "Replay a recorded log");
+    replay->add_option("log", options.input, "The log")->required();
+    add_common(*replay, options);
+    static std::string format = "csv";
+    replay->add_option("--format", format, "Format of the log")->check(CLI::IsMember({"csv"}));
+    replay->add_option("--map", options.map, "MAP.toml, the columns of a foreign CSV");
+    CLI::Option *attack =
+        replay->add_option("--attack", options.attack, "ATTACK.toml or attacks.json to inject");
+    replay->add_option("--attack-id", options.attack_id, "Only that attack of the file")
+        ->needs(attack);
+    return replay;
+}
+
+int complain(const std::string &message, int status)
+{
+    std::string line = message;
+    std::replace(line.begin(), line.end(), '\n', ' ');
+    std::cerr << "blw_sim: " << line << "\n";
+    return status;
+}
+
+int command(int argc, char **argv)
+{
+    CLI::App     app("Bulwark's estimators on simulated and recorded measurements.", "blw_sim");
+    sim::Options options;
+    app.set_version_flag("--version", "blw_sim " + sim::version_text());
+    app.require_subcommand(1);
+    CLI::App *run = add_run(app, options);
+    add_replay(app, options);
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::Success &help_or_version) {
+        return app.exit(help_or_version);
+    } catch (const CLI::ParseError &error) {
+        return complain(std::string(error.what()) + "; see --help", BAD_INPUT);
+    }
+    return run->parsed() ? sim::run_command(options) : sim::replay_command(options);
+}
+
+} // namespace
+
+int main(int argc, char **argv)
+{
+    try {
+        return command(argc, argv);
+    } catch (const sim::InputError &error) {
+        return complain(error.what(), BAD_INPUT);
+    } catch (const std::bad_alloc &) {
+        return complain("not enough memory", FAILED);
+    } catch (const std::exception &error) {
+        return complain(error.what(), FAILED);
+    }
+}

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: MIT
+"""Flash, RAM and work per step of a designed method on a 32-bit target with float numbers.
+
+Flash is that of the constant tables, the plant's included; the code of the library comes on top,
+once for all models.  RAM is the state structure and its memory.  Stack is measured, not computed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from blw.analysis.headers import macro, size_of
+from blw.design import Designed
+from blw.tables import Index, Struct, Table
+
+REAL = 4
+INDEX = {"uint8_t": 1, "uint16_t": 2, "uint32_t": 4}
+
+#: Methods whose C module has another name.
+MODULE = {"canonical": "lasso"}
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Bytes, and multiply-adds per step without alarm and at most (None: not modelled)."""
+
+    flash_bytes: int
+    ram_bytes: int
+    macs_typical: int | None
+    macs_worst: int | None
+
+
+def footprint(name: str, designed: Designed, plant: Struct) -> Footprint:
+    """Footprint of one designed method."""
+    module = MODULE.get(name, name)
+    numbers = macro(f"BLW_{module.upper()}_MEM")(*designed.mem)
+    typical, worst = COSTS[name](designed, plant.to_json()) if name in COSTS else (None, None)
+    return Footprint(
+        flash_bytes=table_bytes(designed.tables) + table_bytes(plant),
+        ram_bytes=size_of(f"blw_{module}_t") + REAL * numbers,
+        macs_typical=typical,
+        macs_worst=worst,
+    )
+
+
+def table_bytes(struct: Struct) -> int:
+    """Bytes of the object, and of all tables and objects it points to."""
+    total = size_of(struct.ctype)
+    for member in struct.members.values():
+        for item in member if isinstance(member, list) else [member]:
+            if isinstance(item, Struct):
+                total += table_bytes(item)
+            elif isinstance(item, Table):
+                total += REAL * item.array.size
+            elif isinstance(item, Index):
+                total += INDEX[item.ctype] * item.array.size
+    return total
+
+
+def _predict(plant: dict[str, Any]) -> int:
+    return plant["n"] * (plant["n"] + plant["l"])
+
+
+def _kalman(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
+    cost = _predict(plant) + 2 * plant["n"] * plant["m"]
+    return cost, cost
+
+
+def _lasso(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
+    """The filters, P and the certificate; every pivot costs a product with Z in both directions and
+    a solve with the largest support."""
+    n, _, N, d, groups, has_P = designed.mem
+    tables = designed.tables.to_json()
+    r = tables["jordan"]["r"]
+    z_length = macro("BLW_L1_Z_LEN")(N, d)
+    rows = macro("BLW_L1_ROWS")(N, d, groups)
+    bands = sum(bool(np.any(tables["jordan"][band])) for band in ("J0", "J1", "J2", "Jm"))
+    filters = N * (bands + 1 + plant["l"]) + (N * r if has_P else 0)
+    typical = _predict(plant) + filters + 2 * z_length + N * n
+    pivot = 2 * z_length + rows * (rows + d)
+    if tables["l1"]["M"] is not None:
+        pivot = N * N
+    return typical, typical + tables["l1"]["max_iterations"] * pivot
+
+
+def _decentral(designed: Designed, plant: dict[str, Any]) -> tuple[int | None, int | None]:
+    n, m, mu, rows, recursive = designed.mem
+    if recursive:
+        return None, None
+    first = np.array(designed.tables.to_json()["first"])
+    d = mu - n
+    triangle = d * mu - d * d // 2
+    typical = (_predict(plant) + m * n + int(np.sum(np.diff(first) ** 2)) + triangle + 2 * n * mu)
+    sets = designed.tables.to_json()["sets"]["n_candidates"]
+    return typical, typical + sets * (triangle + d * rows)
+
+
+def _bank(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
+    n, m = plant["n"], plant["m"]
+    tables = designed.tables.to_json()
+    h, sets, per_set = tables["horizon"], tables["sets"], tables["per_set"]
+    cost = (n * (n + plant["l"] + m) + h * n * (n + m) + sets * per_set * (n + 2)
+            + sum(n * n + 2 * mask.bit_count() * (n + 1) for mask in tables["set_mask"])
+            + sum(h * n * mask.bit_count() for mask in tables["subset_mask"]))
+    return cost, cost
+
+
+#: Multiply-adds as the headers of the modules state them.
+COSTS: dict[str, Callable[[Designed, dict[str, Any]], tuple[int | None, int | None]]] = {
+    "kalman": _kalman, "lasso": _lasso, "canonical": _lasso, "decentral": _decentral, "bank": _bank,
+}

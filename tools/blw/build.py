@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: MIT
+"""Configures and builds the CMake presets that the other commands need.
+
+Quiet where nothing is to be done; a progress bar on a terminal; all that CMake and ninja say is in
+build/<preset>.log.
+"""
+
+import fcntl
+import os
+import re
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+ROOT = Path(__file__).resolve().parents[2]
+BUILD = ROOT / "build"
+PRECISIONS = ("f32", "f64")
+
+_STATUS = re.compile(r"^\[(\d+)/(\d+)\]")
+_SHOWN_LINES = 40
+
+
+class StepFailed(click.ClickException):
+    """A build or a test that failed; the command line prints the message and exits with 1."""
+
+    exit_code = 1
+
+
+def simulator(precision: str) -> Path:
+    """The simulator of one precision ("f32" or "f64"), built if it is missing or out of date.
+
+    Raises StepFailed if it cannot be built.
+    """
+    preset = f"host-{precision}"
+    with _turn(preset):
+        if not (BUILD / preset / "build.ninja").is_file():
+            _configure(preset, tests=False)
+        _make(preset, "blw_sim")
+    return BUILD / preset / "host_sim" / "blw_sim"
+
+
+def build(preset: str) -> Path:
+    """Configure a preset with its tests and build everything; returns its folder.
+
+    Raises StepFailed.
+    """
+    folder = configure(preset)
+    with _turn(preset):
+        _make(preset, "all")
+    return folder
+
+
+def configure(preset: str) -> Path:
+    """Configure a preset with its tests; returns its folder.  Raises StepFailed."""
+    with _turn(preset):
+        _configure(preset, tests=True)
+    return BUILD / preset
+
+
+def log_path(preset: str) -> Path:
+    """Where the output of configuring and building a preset goes."""
+    return BUILD / f"{preset}.log"
+
+
+@contextmanager
+def _turn(preset: str) -> Iterator[None]:
+    """Builds of one preset wait for each other."""
+    BUILD.mkdir(exist_ok=True)
+    with (BUILD / f".{preset}.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
+def _configure(preset: str, tests: bool) -> None:
+    switch = f"-DBLW_TESTS={'ON' if tests else 'OFF'}"
+    with log_path(preset).open("w", encoding="utf-8") as log:
+        cmake = _start(["cmake", "--preset", preset, switch], stdout=log, stderr=subprocess.STDOUT)
+    if cmake.wait() != 0:
+        _fail(preset, "CMake could not configure it")
+
+
+def _make(preset: str, target: str) -> None:
+    command = ["ninja", "-C", str(BUILD / preset), f"-j{os.cpu_count()}", target]
+    ninja = _start(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    with (
+        log_path(preset).open("a", encoding="utf-8") as log,
+        tqdm(desc=f"building {preset}", total=0, disable=None, leave=False) as bar,
+    ):
+        for line in ninja.stdout:
+            log.write(line)
+            status = _STATUS.match(line)
+            if status:
+                bar.total = int(status[2])
+                bar.update(int(status[1]) - bar.n)
+    if ninja.wait() != 0:
+        _fail(preset, "it does not build")
+
+
+def _start(command: list[str], **streams) -> subprocess.Popen:
+    environment = {**os.environ, "NINJA_STATUS": "[%f/%t] "}
+    try:
+        return subprocess.Popen(command, cwd=ROOT, env=environment, **streams)
+    except FileNotFoundError:
+        raise StepFailed(f"{command[0]} is not installed; see tools/bulwark doctor") from None
+
+
+def _fail(preset: str, what: str) -> None:
+    log = log_path(preset)
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    click.echo("\n".join(lines[-_SHOWN_LINES:]), err=True)
+    raise StepFailed(f"preset {preset}: {what}, see {log.relative_to(ROOT)}")

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""`bulwark design`: a model file to NAME.json and the C sources of its tables."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from blw.atomic import write_files
+from blw.design import Design, design_all, document, json_text
+from blw.emit_c import files
+from blw.errors import DesignError
+from blw.model import load
+from blw.progress import steps
+
+
+@click.command(short_help="A model to tables: NAME.json, NAME_model.h and .c.")
+@click.argument("model", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
+              help="Folder for NAME.json, NAME_model.h and NAME_model.c; made if missing.")
+@click.option("--method", "methods", multiple=True, metavar="METHOD",
+              help="Method to design; may be repeated.  Default: all that accept the model.")
+@click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
+def design(model: Path, out: Path, methods: tuple[str, ...], as_json: bool) -> None:
+    """Compute the tables of MODEL (a TOML file) for the library and the simulator."""
+    with steps("design") as progress:
+        result = design_all(load(model), methods or None, progress)
+    if not result.methods:
+        reasons = "; ".join(f"{name}: {reason}" for name, reason in result.refused.items())
+        raise DesignError(f"{model}: no method accepts this model: {reasons}")
+    text = json_text(document(result))
+    written = write_files(out, {f"{result.model.name}.json": text, **files(result)})
+    summary = _summary(result, written)
+    click.echo(json_text(summary) if as_json else _text(result, written), nl=not as_json)
+
+
+def _summary(result: Design, written: list[Path]) -> dict[str, Any]:
+    model = result.model
+    return {"name": model.name, "model_sha256": model.sha256,
+            "n": model.n, "m": model.m, "l": model.l, "p": model.p,
+            "methods": {name: designed.info for name, designed in result.methods.items()},
+            "refused": result.refused,
+            "files": [str(path) for path in written]}
+
+
+def _text(result: Design, written: list[Path]) -> str:
+    model = result.model
+    lines = [f"{model.name}: n = {model.n}, m = {model.m}, l = {model.l}, p = {model.p}"]
+    for name, designed in result.methods.items():
+        figures = ", ".join(f"{key} {_figure(value)}" for key, value in designed.info.items()
+                            if isinstance(value, (int, float, str)))
+        lines.append(f"  {name:<10} {figures}")
+    for name, reason in result.refused.items():
+        lines.append(f"  {name:<10} refused: {reason}")
+    lines += [f"wrote {path}" for path in written]
+    return "\n".join(lines)
+
+
+def _figure(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

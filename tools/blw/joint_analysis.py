@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: MIT
+"""What the estimators of `joint` achieve: steady state, errors under an attack of a given size, and
+the Kalman filters they have to be compared with."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blw import kalman
+from blw.errors import DesignError
+from blw.joint_recursion import (
+    Gains,
+    Pair,
+    Recursion,
+    Stack,
+    fused_covariance,
+    fusion_weights,
+)
+from blw.model import Model
+
+Array = NDArray[np.float64]
+
+MAX_STEPS = 20000
+CONVERGED = 1e-13    # relative change of a step that is taken for rounding
+SETTLED = 1e-10      # the same for covariances under given gains
+EQUAL = 1.02         # variances whose ratio is below are called equal
+CONDITION = 1e9      # growth of a covariance that is taken for divergence
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """Gains, weights G [r n, n], and the variances that go with them.
+
+    theta, gap  [r] error variances of theta, and where the weak sensor's sample is missing
+    trace       of the fused covariance
+    """
+
+    gains: Gains
+    G: Array
+    theta: Array
+    gap: Array
+    trace: float
+
+    def flat(self) -> Array:
+        """Everything that a schedule holds, as one vector."""
+        parts = [*self.gains.K, *self.gains.Gamma, self.G, np.sqrt(self.theta)]
+        return np.concatenate([part.ravel() for part in parts])
+
+
+def transient(model: Model, pairs: Sequence[Pair], P0: Array, eta: Array,
+              printed: bool = False) -> list[Step]:
+    """Steps k = 1, 2, ... until nothing changes any more.  Raises DesignError."""
+    stack = Stack(model, pairs, shared_noise=not printed)
+    recursion = Recursion(stack, P0, eta, printed)
+    start = np.trace(recursion.PX) + np.trace(model.W)
+    steps: list[Step] = []
+    last, change = np.zeros(0), np.inf
+    for _ in range(MAX_STEPS):
+        gains = recursion.advance()
+        if not np.trace(recursion.PX) <= CONDITION * start:
+            raise DesignError("the covariances of the local estimators grow without bound"
+                              + (": the printed recursion is not stable here" if printed else ""))
+        G = fusion_weights(recursion.Sigma, model.n)
+        steps.append(Step(gains, G, recursion.theta_variance.copy(), recursion.gap_variance(gains),
+                          float(np.trace(fused_covariance(recursion.Sigma, G)))))
+        now = np.concatenate([recursion.PX.ravel(), recursion.V.ravel()])
+        if last.size:
+            change = np.abs(now - last).max() / np.abs(now).max()
+        last = now
+        if change <= CONVERGED:
+            return steps
+    raise DesignError(f"the gains have not settled after {MAX_STEPS} steps: they still change by "
+                      f"{change:.1e} per step")
+
+
+@dataclass(frozen=True, eq=False)
+class Performance:
+    """Mean squared errors in steady state: of each local state, of the fused one, of theta [r]."""
+
+    local: Array
+    fused: float
+    theta: Array
+
+
+def performance(model: Model, pairs: Sequence[Pair], step: Step, variance: Array) -> Performance:
+    """Errors of fixed gains when theta is white with these variances [r]; 0 is no attack."""
+    recursion = Recursion(Stack(model, pairs), np.zeros((model.n, model.n)), variance)
+    last = np.zeros_like(recursion.PX)
+    for _ in range(MAX_STEPS):
+        recursion.advance(step.gains)
+        if np.abs(recursion.PX - last).max() <= SETTLED * np.abs(recursion.PX).max():
+            break
+        last = recursion.PX
+    local = np.diag(recursion.Sigma).reshape(len(pairs), model.n).sum(axis=1)
+    fused = float(np.trace(fused_covariance(recursion.Sigma, step.G)))
+    return Performance(local, fused, recursion.theta_variance.copy())
+
+
+def pulse_error(step: Step, benign: Performance, size: float) -> Array:
+    """[r] mean squared error of theta in the first step of an attack of that size."""
+    missed = np.array([1 - K[-1, 0] for K in step.gains.K])
+    return (size * missed) ** 2 + benign.theta
+
+
+def sweep(model: Model, pairs: Sequence[Pair], P0: Array, etas: Sequence[float], size: float,
+          printed: bool = False) -> list[dict[str, Any]]:
+    """State and attack-signal errors of every compensation factor, for an attack of that size.
+
+    `white` is the attack with the variance size^2 on all weak sensors, `pulse` its first sample
+    after none.
+    """
+    rows = []
+    for eta in etas:
+        step = transient(model, pairs, P0, np.full(len(pairs), eta), printed)[-1]
+        benign = performance(model, pairs, step, np.zeros(len(pairs)))
+        white = performance(model, pairs, step, np.full(len(pairs), size**2))
+        rows.append({
+            "eta": eta,
+            "state_benign": benign.fused,
+            "state_white": white.fused,
+            "theta_benign": benign.theta.tolist(),
+            "theta_white": white.theta.tolist(),
+            "theta_pulse": pulse_error(step, benign, size).tolist(),
+        })
+    return rows
+
+
+def default_size(model: Model, pairs: Sequence[Pair]) -> float:
+    """Ten standard deviations of the noisiest weak sensor."""
+    return 10 * float(np.sqrt(max(model.R[pair.weak, pair.weak] for pair in pairs)))
+
+
+def decades(model: Model, pairs: Sequence[Pair], size: float) -> list[float]:
+    """Powers of ten from a tenth of the quietest weak sensor's variance to ten times size^2."""
+    low = min(model.R[pair.weak, pair.weak] for pair in pairs) / 10
+    first = int(np.floor(np.log10(low) + 1e-9))
+    last = int(np.ceil(np.log10(10 * size**2) - 1e-9))
+    return [float(f"1e{exponent}") for exponent in range(first, max(first, last) + 1)]
+
+
+def strong_filter(model: Model, strong: Sequence[int]) -> float | None:
+    """tr P of a Kalman filter on these sensors alone; None if they do not see every mode."""
+    rows = list(strong)
+    try:
+        found = kalman.steady_state(model.A, model.C[rows], model.W, model.R[np.ix_(rows, rows)])
+    except DesignError:
+        return None
+    return float(np.trace(found.P))
+
+
+def central_filter(model: Model, pairs: Sequence[Pair], eta: Array) -> float:
+    """tr P of one Kalman filter on all their sensors, eta added to the noise of the weak ones."""
+    rows = sorted({sensor for pair in pairs for sensor in pair.sensors})
+    extra = np.zeros(model.m)
+    extra[[pair.weak for pair in pairs]] = eta
+    R = (model.R + np.diag(extra))[np.ix_(rows, rows)]
+    return float(np.trace(kalman.steady_state(model.A, model.C[rows], model.W, R).P))
+
+
+def verdict(names: Sequence[str], fused: float, strong: float | None, central: float) -> str:
+    """What a reader should know before choosing the method, in a sentence or two."""
+    listed = ", ".join(names)
+    if strong is None:
+        return (f"the strong sensors alone ({listed}) do not see every mode, so no Kalman filter "
+                "can run on them; an attack that imitates an unseen mode stays unseen")
+    if strong <= EQUAL * fused:
+        text = (f"a Kalman filter on the strong sensors alone ({listed}) does as well: tr P "
+                f"{strong:.4g} against {fused:.4g} of the fusion; what the method adds is the "
+                "estimate of the attack signal")
+    else:
+        text = (f"the fusion has tr P {fused:.4g}, a Kalman filter on the strong sensors alone "
+                f"({listed}) {strong:.4g}")
+    if central * EQUAL < fused:
+        text += (f"; one Kalman filter on all sensors with eta added to the noise of the weak ones "
+                 f"would have {central:.4g}, without estimating the attack")
+    return text

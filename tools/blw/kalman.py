@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: MIT
+"""Steady-state Kalman filter, [L] (3)-(8), and the design of the method `kalman`.
+
+    Pp  = A P A' + W                      W = B Q B'
+    K   = Pp C' (C Pp C' + R)^-1
+    P   = (I - K C) Pp (I - K C)' + K R K'
+    Acl = (I - K C) A
+
+A mode that no sensor sees but that dies out by itself is kept: the filter predicts it.  Methods
+that need every mode to be seen refuse such a model.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, matrix_balance, solve_discrete_are
+
+from blw import chi2
+from blw.design import Designed
+from blw.errors import DesignError
+from blw.model import Model
+from blw.tables import Struct, table
+
+NAME = "kalman"
+
+UNIT_CIRCLE = 1e-8     # an eigenvalue this close to it counts as on it
+CLUSTER = 1e-4         # eigenvalues of a defective matrix scatter; their mean does not
+PBH = 1e-10            # relative singular value below which a mode is unseen
+POLISH_STEPS = 20      # Riccati steps at most
+SEMIDEFINITE = 1e-9    # negative eigenvalue of a correlation matrix that is taken for rounding
+ROUNDING = 1e-14       # relative eigenvalue of a correlation matrix that is taken for rounding
+CONDITION_MAX = 1e14   # of the correlation matrix of R
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Kalman:
+    """Steady state: gain K [n, m], filtered and predicted covariance P, Pp [n, n], Acl [n, n]."""
+
+    K: Array
+    P: Array
+    Pp: Array
+    Acl: Array
+
+
+@dataclass(frozen=True)
+class Options:
+    """The method has no options."""
+
+
+def steady_state(A: Array, C: Array, W: Array, R: Array) -> Kalman:
+    """The stabilising solution of the Riccati equation, polished by Riccati steps.
+
+    A [n, n], C [m, n], W = B Q B' [n, n] positive semidefinite, R [m, m] positive definite.
+    Raises DesignError naming the mode that no sensor sees or no noise moves, or the sensor whose
+    noise is not positive.
+    """
+    A, C, W, R = (np.asarray(matrix, dtype=float) for matrix in (A, C, W, R))
+    _check_R(R)
+    _check_modes(A, C, "no sensor sees the mode", "it is not detectable")
+    _check_modes(A.T, _root(W), "no noise reaches the mode",
+                 "it is not stabilisable; give B Q B' a part in it")
+    try:
+        Pp = solve_discrete_are(A.T, C.T, W, R)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise DesignError(f"the Riccati equation has no stabilising solution ({error})") from None
+    return _checked(_polish(A, C, W, R, (Pp + Pp.T) / 2))
+
+
+def modes(A: Array) -> list[complex]:
+    """Eigenvalues of A [n, n] and the means of their clusters, upper half plane only."""
+    eigenvalues = [z for z in np.linalg.eigvals(A) if z.imag >= 0]
+    found = list(eigenvalues)
+    for z in eigenvalues:
+        near = [w for w in eigenvalues if abs(w - z) <= CLUSTER * max(1.0, abs(z))]
+        mean = complex(np.mean(near))
+        if len(near) > 1 and all(abs(mean - w) > 0 for w in found):
+            found.append(mean)
+    return found
+
+
+def unseen(A: Array, C: Array, z: complex) -> bool:
+    """Whether C [m, n] fails to see the mode z of A [n, n]: Popov, Belevitch and Hautus.
+
+    A is balanced and every row of C counts alike, so the units of states and sensors do not matter.
+    """
+    balanced, units = matrix_balance(A, permute=False)
+    scale = max(np.linalg.norm(balanced, 2), abs(z), np.finfo(float).tiny)
+    rows = C @ units
+    norms = np.linalg.norm(rows, axis=1, keepdims=True)
+    rows = scale * rows / np.where(norms > 0, norms, 1.0)
+    pencil = np.vstack([z * np.eye(len(A)) - balanced, rows])
+    return bool(np.linalg.svd(pencil, compute_uv=False)[-1] <= PBH * scale)
+
+
+def unobservable_modes(A: Array, C: Array) -> list[complex]:
+    """The modes of A [n, n] that C [m, n] does not see, upper half plane only."""
+    return [z for z in modes(A) if unseen(A, C, z)]
+
+
+def mode_text(z: complex) -> str:
+    """A mode, or a pair of them, for messages."""
+    return f"{z.real:.6g}" if z.imag == 0 else f"{z.real:.6g} +- {z.imag:.6g}i"
+
+
+def design(model: Model, kalman: Kalman, options: Options) -> Designed:
+    """Tables of blw_kalman_model_t, and a detector on the filter's innovations."""
+    tables = Struct("blw_kalman_model_t", NAME,
+                    {"K": table(kalman.K, "[n x m] steady-state gain")}, method=NAME)
+    S = model.C @ kalman.Pp @ model.C.T + model.R
+    info = {
+        "trace_P": float(np.trace(kalman.P)),
+        "sigma": np.sqrt(np.diag(kalman.P)).tolist(),
+        "innovation_sigma": np.sqrt(np.diag(S)).tolist(),
+        "spectral_radius": float(np.abs(np.linalg.eigvals(kalman.Acl)).max()),
+        "unobservable_modes": [mode_text(z) for z in unobservable_modes(model.A, model.C)],
+        "cond_P": float(np.linalg.cond(kalman.P)),
+        "cond_S": float(np.linalg.cond(S)),
+    }
+    return Designed(tables, info, mem=(model.n, model.m), extras=(chi2.detector(S),))
+
+
+def _check_R(R: Array) -> None:
+    for i, variance in enumerate(np.diag(R)):
+        if not variance > 0:
+            raise DesignError(f"R is not positive definite: sensor {i + 1} has the variance "
+                              f"{variance:.6g}")
+    d = np.sqrt(np.diag(R))
+    eigenvalues = np.linalg.eigvalsh(R / np.outer(d, d))
+    if eigenvalues[0] <= eigenvalues[-1] / CONDITION_MAX:
+        raise DesignError("R is not positive definite: the smallest eigenvalue of its correlation "
+                          f"matrix is {eigenvalues[0]:.3g}")
+
+
+def _root(W: Array) -> Array:
+    """[n, n] with root' root = W, for W positive semidefinite; eigenvalues at rounding are 0."""
+    d = np.sqrt(np.clip(np.diag(W), 0.0, None))
+    units = np.where(d > 0, d, 1.0)
+    values, vectors = np.linalg.eigh(W / np.outer(units, units))
+    if values[0] < -SEMIDEFINITE:
+        raise DesignError("B Q B' is not positive semidefinite: the smallest eigenvalue of its "
+                          f"correlation matrix is {values[0]:.3g}")
+    values = np.where(values > ROUNDING * max(values[-1], 0.0), values, 0.0)
+    return np.sqrt(values)[:, None] * vectors.T * units
+
+
+def _check_modes(A: Array, C: Array, what: str, consequence: str) -> None:
+    for z in unobservable_modes(A, C):
+        if abs(z) >= 1 - UNIT_CIRCLE:
+            raise DesignError(f"{what} {mode_text(z)} (|z| = {abs(z):.6g}): {consequence}")
+
+
+def _riccati(A: Array, C: Array, W: Array, R: Array, Pp: Array) -> Kalman:
+    """Measurement update in Joseph form from the predicted covariance Pp."""
+    S = C @ Pp @ C.T + R
+    K = cho_solve(cho_factor(S), C @ Pp).T
+    keep = np.eye(len(A)) - K @ C
+    P = keep @ Pp @ keep.T + K @ R @ K.T
+    return Kalman(K=K, P=(P + P.T) / 2, Pp=Pp, Acl=keep @ A)
+
+
+def _polish(A: Array, C: Array, W: Array, R: Array, Pp: Array) -> Kalman:
+    """Riccati steps while they still change Pp less and less."""
+    filtered = _riccati(A, C, W, R, Pp)
+    change = np.inf
+    for _ in range(POLISH_STEPS):
+        Pp_next = A @ filtered.P @ A.T + W
+        Pp_next = (Pp_next + Pp_next.T) / 2
+        last, change = change, np.abs(Pp_next - filtered.Pp).max()
+        if not change < last:
+            break
+        filtered = _riccati(A, C, W, R, Pp_next)
+    return filtered
+
+
+def _checked(kalman: Kalman) -> Kalman:
+    radius = np.abs(np.linalg.eigvals(kalman.Acl)).max()
+    if not np.isfinite(kalman.K).all() or not radius < 1:
+        raise DesignError("the steady-state filter is not stable: an eigenvalue of A - K C A has "
+                          f"the magnitude {radius:.9g}")
+    return kalman

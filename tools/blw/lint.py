@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: MIT
+"""Checks of the sources themselves: format, static analysis, shell scripts."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import click
+
+from blw.build import ROOT, configure
+from blw.tally import Tally
+
+LLVM = "14"  # Debian 12's; another version formats differently
+SHELL = ("tools/bulwark", "tools/setup/setup.sh", "tools/check_archive.sh", ".ci/run",
+         "tests/archive/test_check_archive.sh")
+
+
+def run() -> Tally:
+    """Run every check; prints what they find."""
+    database = configure("clang-f32")
+    library = _sources("lib/src", ".c")
+    written = _sources("lib/include", ".h") + _sources("lib/src", ".c", ".h") + _sources(
+        "host_sim", ".cpp", ".h") + _sources("tests", ".c", ".h", ".cpp", ".hpp")
+    commands = {
+        "clang-format": [[f"clang-format-{LLVM}", "--dry-run", "-Werror", *written]],
+        "clang-tidy": [[f"clang-tidy-{LLVM}", "--quiet", "-p", str(database), source]
+                       for source in library],
+        "cppcheck": [["cppcheck", "--quiet", "--std=c99", "--inline-suppr", "--error-exitcode=1",
+                      "--enable=warning,performance,portability", "-Ilib/include", "-Ilib/src",
+                      *library]],
+        "shellcheck": [["shellcheck", "--external-sources", *SHELL]],
+        "ruff": [[sys.executable, "-m", "ruff", "check", "--quiet", "tools", "tests"]],
+    }
+    return sum((_check(name, each) for name, each in commands.items()), Tally())
+
+
+def _sources(folder: str, *suffixes: str) -> list[str]:
+    found = (ROOT / folder).rglob("*")
+    return sorted(str(path.relative_to(ROOT)) for path in found if path.suffix in suffixes)
+
+
+def _check(name: str, commands: Sequence[Sequence[str]]) -> Tally:
+    """One check, which may be several commands; what the failed ones printed is printed."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        results = list(pool.map(_call, commands))
+    failed = [result for result in results if result.returncode != 0]
+    for result in failed:
+        click.echo(result.stdout.rstrip(), err=True)
+    if failed:
+        click.echo(f"bulwark: {name} found something", err=True)
+    return Tally.of(not failed)
+
+
+def _call(command: Sequence[str]) -> subprocess.CompletedProcess:
+    try:
+        return subprocess.run(command, cwd=ROOT, check=False, text=True,
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    except FileNotFoundError:
+        return subprocess.CompletedProcess(command, 127, f"{command[0]} is not installed")

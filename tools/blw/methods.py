@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: MIT
+"""The methods that can be designed, by name, in the order in which they are tried and listed.
+
+A module has NAME, a dataclass Options, and design(model, kalman, options) -> Designed.
+"""
+
+from types import ModuleType
+
+from blw import bank, canonical, decentral, kalman, lasso
+
+REGISTRY: dict[str, ModuleType] = {module.NAME: module for module in (
+    kalman,
+    lasso,
+    canonical,
+    decentral,
+    bank,
+)}

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: MIT
+"""`bulwark run` and `bulwark replay`: the C library on simulated and on recorded measurements.
+
+Both hand their work to blw_sim, the host build of the library; `run` designs the scenario's model
+first.
+"""
+
+import subprocess
+import tempfile
+import tomllib
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from blw.atomic import write_files
+from blw.build import PRECISIONS, simulator
+from blw.design import design_all, document, json_text
+from blw.errors import BulwarkError
+from blw.methods import REGISTRY
+from blw.model import load
+from blw.progress import steps
+
+BAD_INPUT = 2
+EVERY_METHOD = "all"
+
+
+def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
+    for option in reversed((
+        click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
+                     help="Folder for the results; made if missing."),
+        click.option("--method", "methods", multiple=True, metavar="METHOD",
+                     default=(EVERY_METHOD,), show_default=True,
+                     help="Method to run beside kalman and oracle; may be repeated."),
+        click.option("--seed", type=click.IntRange(min=0), help="Seed of the random numbers."),
+        click.option("--precision", type=click.Choice(PRECISIONS), default="f32",
+                     show_default=True, help="Numbers of the library: float or double."),
+        click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON."),
+    )):
+        command = option(command)
+    return command
+
+
+@click.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@_shared_options
+@click.option("--runs", type=click.IntRange(min=1), help="Number of runs, each with its own seed.")
+def run(scenario: Path, **options: Any) -> int:
+    """Simulate SCENARIO (a TOML file) and write what every method made of it."""
+    return run_scenario(scenario, **options)
+
+
+@click.command()
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option("--design", required=True, type=click.Path(path_type=Path),
+              help="NAME.json of the design command.")
+@_shared_options
+@click.option("--format", "log_format", type=click.Choice(("csv",)), default="csv",
+              show_default=True, help="Format of the log.")
+@click.option("--map", "column_map", type=click.Path(path_type=Path), metavar="MAP.toml",
+              help="Columns of a foreign CSV.")
+@click.option("--attack", type=click.Path(path_type=Path), metavar="ATTACK.toml",
+              help="Attack to inject; an attacks.json works too.")
+@click.option("--attack-id", metavar="ID", help="Only that attack of the file.")
+def replay(log: Path, design: Path, column_map: Path | None, log_format: str,
+           precision: str, **options: Any) -> int:
+    """Replay the recorded LOG through the methods of a design."""
+    arguments = _arguments({"design": design, "format": log_format, "map": column_map, **options})
+    return subprocess.call([simulator(precision), "replay", log, *arguments])
+
+
+def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METHOD,),
+                 precision: str = "f32", **options: Any) -> int:
+    """Design the scenario's model, simulate it, and write the results and the design into out.
+
+    options: seed, runs, as_json, as on the command line.  Returns the status of blw_sim, which
+    has said what was wrong if it is not 0.  Raises BulwarkError for a bad scenario or model.
+    """
+    model_path, controller = _read_scenario(scenario)
+    model = load(model_path)
+    with steps("design") as progress:
+        wanted = _wanted(methods, controller)
+        text = json_text(document(design_all(model, wanted, progress)))
+    name = f"{model.name}.json"
+    with tempfile.TemporaryDirectory(prefix="bulwark.") as folder:
+        (design,) = write_files(Path(folder), {name: text})
+        arguments = _arguments({"design": design, "out": out, "methods": methods, **options})
+        status = subprocess.call([simulator(precision), "run", scenario, *arguments])
+    if status != BAD_INPUT:
+        write_files(out / "design", {name: text})
+    return status
+
+
+def _read_scenario(scenario: Path) -> tuple[Path, str]:
+    """The scenario's model file and the method that its controller uses, if it names one.
+
+    blw_sim, which reads the rest, complains about the rest.
+    """
+    try:
+        content = tomllib.loads(scenario.read_text(encoding="utf-8"))
+    except UnicodeDecodeError:
+        raise BulwarkError(f"{scenario}: not a UTF-8 text file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise BulwarkError(f"{scenario}: {error}") from None
+    model = content.get("model")
+    if not isinstance(model, str):
+        raise BulwarkError(f"{scenario}: 'model' must name a model file")
+    controller = content.get("controller")
+    method = controller.get("method") if isinstance(controller, dict) else None
+    return scenario.parent / model, method if isinstance(method, str) else ""
+
+
+def _wanted(methods: Sequence[str], controller: str) -> list[str] | None:
+    """The methods to design; None for all that accept the model."""
+    if EVERY_METHOD in methods:
+        return None
+    return list(dict.fromkeys(["kalman", *methods] + [name for name in REGISTRY
+                                                      if name == controller]))
+
+
+def _arguments(options: dict[str, Any]) -> list[str]:
+    """Options of blw_sim: those that were given, under their names there."""
+    names = {"methods": "method", "as_json": "json", "attack_id": "attack-id"}
+    arguments: list[str] = []
+    for key, value in options.items():
+        option = "--" + names.get(key, key)
+        if value is True:
+            arguments.append(option)
+        elif isinstance(value, tuple):
+            arguments += [option, ",".join(value)]
+        elif value is not None and value is not False:
+            arguments += [option, str(value)]
+    return arguments

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: MIT
+"""`bulwark test`: builds every preset and runs everything that CI runs."""
+
+import os
+import subprocess
+import sys
+import time
+import xml.etree.ElementTree as xml
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+
+import click
+
+from blw import lint
+from blw.build import BUILD, ROOT, StepFailed, build, configure
+from blw.errors import BulwarkError
+from blw.options import suggestion
+from blw.tally import Tally
+
+PRESETS = ("host-f32", "host-f64", "asan", "clang-f32")
+SUITES = ("design", "program")
+LINT = "lint"
+COVERAGE = "coverage"
+MIN_BRANCHES_PERCENT = 95
+
+Step = Callable[[], Tally]
+
+
+@click.command()
+@click.argument("labels", nargs=-1, metavar="[LABEL]...")
+def test(labels: tuple[str, ...]) -> int:
+    """Run all tests, or those with one of the LABELs.
+
+    Labels: design and program (the Python suites), lint, coverage, and those of the C tests:
+    unit, reference, header, install, archive.
+    """
+    total = Tally()
+    for name, step in _plan(labels).items():
+        total += _report(name, step)
+    click.echo(str(total))
+    return 1 if total.failed else 0
+
+
+def _plan(labels: Sequence[str]) -> dict[str, Step]:
+    """The steps that cover the labels, all steps without labels."""
+    own = [*SUITES, LINT, COVERAGE]
+    c_labels = [label for label in labels if label not in own]
+    if c_labels:
+        _check_known(c_labels, own)
+    steps: dict[str, Step] = {}
+    if c_labels or not labels:
+        steps |= {preset: partial(_ctest, preset, c_labels) for preset in PRESETS}
+    for name, step in (*((suite, partial(_pytest, suite)) for suite in SUITES),
+                       (LINT, lint.run), (COVERAGE, _coverage)):
+        if name in labels or not labels:
+            steps[name] = step
+    return steps
+
+
+def _check_known(labels: Sequence[str], own: Sequence[str]) -> None:
+    """Raise BulwarkError for the first label that no test has."""
+    printed = subprocess.run(["ctest", "--test-dir", configure(PRESETS[0]), "--print-labels"],
+                             check=True, capture_output=True, text=True).stdout
+    known = [line.strip() for line in printed.splitlines() if line.startswith("  ")]
+    for label in labels:
+        if label not in known:
+            raise BulwarkError(f"no test has the label '{label}'; "
+                               + suggestion(label, [*known, *own]))
+
+
+def _report(name: str, step: Step) -> Tally:
+    """Run a step and print a line about it; a step that cannot be run has failed."""
+    start = time.monotonic()
+    try:
+        tally = step()
+    except StepFailed as error:
+        click.echo(f"bulwark: {error.message}", err=True)
+        tally = Tally(failed=1)
+    click.echo(f"{name + ':':<12}{tally} ({time.monotonic() - start:.0f} s)")
+    return tally
+
+
+def _ctest(preset: str, labels: Sequence[str]) -> Tally:
+    folder = build(preset)
+    command = ["ctest", "--preset", preset, "-j", str(os.cpu_count()), "--quiet"]
+    if labels:
+        command += ["--label-regex", f"^({'|'.join(labels)})$"]
+    return _with_junit(command, folder / "ctest.xml", "--output-junit")
+
+
+def _pytest(suite: str) -> Tally:
+    command = [sys.executable, "-m", "pytest", "--quiet", "-rs", "-n", str(os.cpu_count()),
+               str(ROOT / "tests" / suite)]
+    return _with_junit(command, BUILD / f"{suite}.xml", "--junitxml")
+
+
+def _with_junit(command: list[str], result: Path, option: str) -> Tally:
+    """Run a test runner that writes a JUnit file, and count what the file holds."""
+    result.unlink(missing_ok=True)
+    # The tests share the cores among themselves; a library must not take them all for one.
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+                   "HYPOTHESIS_STORAGE_DIRECTORY": str(BUILD / "hypothesis")}
+    sys.stdout.flush()
+    status = subprocess.call([*command, option, str(result)], cwd=ROOT, env=environment)
+    cases = xml.parse(result).iter("testcase") if result.is_file() else ()
+    tally = Tally.of_cases(cases)
+    if status != 0 and tally.failed == 0:  # it broke down outside of any test
+        tally += Tally(failed=1)
+    return tally
+
+
+def _coverage() -> Tally:
+    """Branch coverage of lib/ by the C tests."""
+    folder = build(COVERAGE)
+    for counts in folder.rglob("*.gcda"):
+        counts.unlink()
+    tally = _ctest(COVERAGE, ())
+    command = ["gcovr", "--root", str(ROOT), "--object-directory", str(folder), "--branches",
+               "--exclude-unreachable-branches", "--filter", str(ROOT / "lib" / "src"),
+               "--fail-under-branch", str(MIN_BRANCHES_PERCENT), str(folder)]
+    covered = subprocess.call(command, cwd=ROOT) == 0
+    if not covered:
+        click.echo(f"bulwark: less than {MIN_BRANCHES_PERCENT} % of the branches of lib/ are "
+                   "covered", err=True)
+    return tally + Tally.of(covered)
