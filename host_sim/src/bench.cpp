@@ -32,12 +32,18 @@ Verdict verdict_of(const blw_estimator_out_t &out, Instant at, const Design &des
 
 const char *const ORACLE = "oracle";
 
-Bench::Bench(const Design &design, const std::vector<std::string> &methods)
+Bench::Bench(const Design &design, const std::vector<std::string> &methods, bool compare)
     : design_(&design), plant_(load_plant(design)), oracle_(design)
 {
     estimators_.reserve(methods.size());
     for (const std::string &method : methods) {
         estimators_.emplace_back(design, *plant_, method);
+    }
+    if (compare) {
+        for (const auto kind : {Comparison::Kind::augmented, Comparison::Kind::augmented_blind,
+                                Comparison::Kind::adaptive}) {
+            comparisons_.emplace_back(design, kind);
+        }
     }
 }
 
@@ -46,10 +52,14 @@ void Bench::start()
     traces_.clear();
     for (Estimator &estimator : estimators_) {
         estimator.reset();
-        traces_.push_back({estimator.name(), {}});
+        traces_.push_back({estimator.name(), {}, estimator.extra_columns()});
+    }
+    for (Comparison &comparison : comparisons_) {
+        comparison.reset();
+        traces_.push_back({comparison.name(), {}, {}});
     }
     oracle_ = Oracle(*design_);
-    traces_.push_back({ORACLE, {}});
+    traces_.push_back({ORACLE, {}, {}});
 }
 
 void Bench::step(const Row &last, const Row &now)
@@ -58,6 +68,10 @@ void Bench::step(const Row &last, const Row &now)
         const blw_estimator_out_t &out =
             estimators_[i].step(last.u, now.samples.y, now.samples.valid);
         traces_[i].verdicts.push_back(verdict_of(out, now.at, *design_));
+        traces_[i].verdicts.back().extra = estimators_[i].extra_values();
+    }
+    for (std::size_t i = 0U; i < comparisons_.size(); i++) {
+        step_comparison(i, last, now);
     }
     step_oracle(last, now);
 }
@@ -70,6 +84,20 @@ const Eigen::VectorXd &Bench::x_hat(const std::string &method) const
         throw InputError("no method \"" + method + "\" among those that run");
     }
     return found->verdicts.empty() ? design_->x0 : found->verdicts.back().x_hat;
+}
+
+void Bench::step_comparison(std::size_t i, const Row &last, const Row &now)
+{
+    const blw_mask_t used = usable(*design_, now.samples.y, now.samples.valid);
+    comparisons_[i].step(last.u, now.samples.y, used);
+
+    Verdict verdict;
+    verdict.at        = now.at;
+    verdict.x_hat     = comparisons_[i].x_hat();
+    verdict.used      = used;
+    verdict.suspicion = Eigen::VectorXd::Zero(now.samples.y.size());
+    verdict.flags     = (used != BLW_MASK_ALL(design_->m)) ? BLW_FLAG_MISSING : 0U;
+    traces_[estimators_.size() + i].verdicts.push_back(std::move(verdict));
 }
 
 void Bench::step_oracle(const Row &last, const Row &now)

@@ -211,7 +211,8 @@ int run_command(const Options &options)
     Scenario     scenario = load_scenario(options.input, design);
     scenario.seed         = options.seed.value_or(scenario.seed);
     scenario.runs         = options.runs.value_or(scenario.runs);
-    Bench   bench(design, choose_methods(options, design, scenario.controller.method));
+    Bench   bench(design, choose_methods(options, design, scenario.controller.method),
+                  options.compare);
     Session session(design, options);
 
     const std::optional<Divergence> divergence = simulate_runs(scenario, design, bench, session);
@@ -240,7 +241,7 @@ int replay_command(const Options &options)
         attacks = read_attacks(options.attack, options.attack_id, design);
         attack_log(log, design, attacks, seed);
     }
-    Bench   bench(design, choose_methods(options, design, ""));
+    Bench   bench(design, choose_methods(options, design, ""), options.compare);
     Session session(design, options);
     replay(log, bench);
     session.take(log, bench.traces());

@@ -26,7 +26,8 @@ struct Options {
     std::string                  map;
     std::string                  attack;
     std::string                  attack_id;
-    bool                         json = false;
+    bool                         compare = false; /* with the filters of comparison.h */
+    bool                         json    = false;
 };
 
 int run_command(const Options &options);

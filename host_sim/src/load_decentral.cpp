@@ -28,6 +28,7 @@ struct Sizes {
     std::size_t n, m, mu;
     std::size_t blocks = 0U; /* sum of mu_i^2 */
     std::size_t Q      = 0U;
+    std::size_t H      = 0U; /* sum of mu_i (mu_i + 1) / 2 */
 
     Sizes(const blw_plant_t &plant, const blw_decentral_model_t &model)
         : n(plant.n), m(plant.m), mu(model.mu)
@@ -37,6 +38,7 @@ struct Sizes {
             const std::size_t local = end - model.first[i];
             blocks += local * local;
             Q += local * std::min(end, mu - n);
+            H += (local * (local + 1U)) / 2U;
         }
     }
 };
@@ -75,6 +77,7 @@ void load_steady(TableReader tables, const Sizes &sizes, std::size_t n_sets,
     steady.Psi          = tables.reals("Psi", sizes.n * sizes.mu);
     steady.Q            = tables.reals("Q", sizes.Q);
     steady.Y            = tables.reals("Y", sizes.mu * sizes.n);
+    steady.H            = tables.reals_or_null("H", sizes.H);
     steady.at           = tables.indices("at", n_sets + 1U);
     steady.M            = tables.reals("M", steady.at[n_sets]);
 }

@@ -2,6 +2,7 @@
 #include "methods.h"
 #include "blw/blw_bank.h"
 #include "blw/blw_decentral.h"
+#include "blw/blw_joint.h"
 #include "blw/blw_kalman.h"
 #include "blw/blw_lasso.h"
 #include "error.h"
@@ -32,6 +33,16 @@ const char *reason(blw_status_t status)
 
 } // namespace
 
+std::vector<std::string> MethodTables::extra_columns(const Design & /*design*/) const
+{
+    return {};
+}
+
+void MethodTables::extra_values(const blw_estimator_t & /*state*/,
+                                std::vector<double> & /*values*/) const
+{
+}
+
 const std::vector<Method> &registry()
 {
     static const std::vector<Method> methods = {
@@ -40,6 +51,7 @@ const std::vector<Method> &registry()
         {"canonical", BLW_METHOD_CANONICAL, &blw_lasso_ops, load_lasso},
         {"decentral", BLW_METHOD_DECENTRAL, &blw_decentral_ops, load_decentral},
         {"bank", BLW_METHOD_BANK, &blw_bank_ops, load_bank},
+        {"joint", BLW_METHOD_JOINT, &blw_joint_ops, load_joint},
     };
     return methods;
 }
@@ -99,6 +111,14 @@ Estimator::Estimator(const Design &design, const Plant &plant, const std::string
     if (status != BLW_OK) {
         node.fail(std::string("the library refuses these tables: ") + reason(status));
     }
+    extra_columns_ = tables_->extra_columns(design);
+}
+
+std::vector<double> Estimator::extra_values() const
+{
+    std::vector<double> values;
+    tables_->extra_values(*self(), values);
+    return values;
 }
 
 void Estimator::reset()

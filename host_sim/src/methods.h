@@ -23,6 +23,10 @@ public:
     virtual ~MethodTables() = default;
     /** First member of the model. */
     virtual blw_model_t &head() = 0;
+    /** Columns that only this method has, after the standard ones of its trace. */
+    virtual std::vector<std::string> extra_columns(const Design &design) const;
+    /** What belongs in them after a step of the estimator. */
+    virtual void extra_values(const blw_estimator_t &state, std::vector<double> &values) const;
 };
 
 /** Makes a method's C model from its tables; the head is filled in by the caller. */
@@ -37,6 +41,7 @@ struct Method {
 
 std::unique_ptr<MethodTables> load_bank(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_decentral(TableReader &tables, const blw_plant_t &plant);
+std::unique_ptr<MethodTables> load_joint(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_kalman(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_lasso(TableReader &tables, const blw_plant_t &plant);
 
@@ -63,7 +68,13 @@ public:
     {
         return name_;
     }
-    void reset();
+    /** Columns of this method alone, and what the last step put into them. */
+    const std::vector<std::string> &extra_columns() const
+    {
+        return extra_columns_;
+    }
+    std::vector<double> extra_values() const;
+    void                reset();
     /** One step with u(k-1) [l], y(k) [m]; the result holds until the next call. */
     const blw_estimator_out_t &step(const Eigen::VectorXd &u, const Eigen::VectorXd &y,
                                     blw_mask_t valid);
@@ -73,10 +84,15 @@ private:
     {
         return reinterpret_cast<blw_estimator_t *>(state_.data());
     }
+    const blw_estimator_t *self() const
+    {
+        return reinterpret_cast<const blw_estimator_t *>(state_.data());
+    }
 
     std::string                   name_;
     TableStore                    store_;
     std::unique_ptr<MethodTables> tables_;
+    std::vector<std::string>      extra_columns_;
     std::vector<std::max_align_t> state_;
     std::vector<blw_real_t>       memory_, u_, y_;
     blw_estimator_out_t           out_{};

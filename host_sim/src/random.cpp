@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: MIT */
 #include "random.h"
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace sim
@@ -9,6 +8,8 @@ namespace
 {
 
 const double TWO_PI = 6.283185307179586476925286766559;
+/* Share of a variance below which what is left of it is rounding. */
+const double NO_NOISE = 1e-13;
 
 /* splitmix64 (Steele, Lea, Flood 2014): neighbouring seeds give unrelated states. */
 std::uint64_t scramble(std::uint64_t value)
@@ -58,10 +59,23 @@ std::uint64_t run_seed(std::uint64_t seed, std::uint64_t run)
     return (run == 0U) ? seed : scramble(seed ^ scramble(run));
 }
 
+/* Cholesky; a pivot that is zero but for rounding is a direction without noise. */
 Eigen::MatrixXd covariance_root(const Eigen::MatrixXd &covariance)
 {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance);
-    return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+    const Eigen::Index n    = covariance.rows();
+    Eigen::MatrixXd    root = Eigen::MatrixXd::Zero(n, n);
+    for (Eigen::Index j = 0; j < n; j++) {
+        const double pivot = covariance(j, j) - root.row(j).head(j).squaredNorm();
+        if (!(pivot > NO_NOISE * covariance(j, j))) {
+            continue;
+        }
+        root(j, j) = std::sqrt(pivot);
+        for (Eigen::Index i = j + 1; i < n; i++) {
+            const double rest = covariance(i, j) - root.row(i).head(j).dot(root.row(j).head(j));
+            root(i, j)        = rest / root(j, j);
+        }
+    }
+    return root;
 }
 
 } // namespace sim

@@ -24,6 +24,8 @@ void add_common(CLI::App &command, sim::Options &options)
         ->default_val(std::vector<std::string>{"all"});
     command.add_option("--seed", options.seed, "Seed of the random numbers")
         ->check(CLI::NonNegativeNumber);
+    command.add_flag("--compare", options.compare,
+                     "Also the filters that joint is compared with in its paper");
     command.add_flag("--json", options.json, "Print summary.json instead of a table");
 }
 

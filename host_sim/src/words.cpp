@@ -7,12 +7,15 @@ namespace sim
 namespace
 {
 
-std::string header(const Design &design)
+std::string header(const Trace &trace, const Design &design)
 {
     std::string line = "k,t_s,status," + join(design.states, ",")
                        + ",statistic,threshold,iterations,bound,excluded";
     for (const std::string &sensor : design.sensors) {
         line += ",suspicion:" + sensor;
+    }
+    for (const std::string &column : trace.extra_columns) {
+        line += "," + column;
     }
     return line + "\n";
 }
@@ -39,6 +42,9 @@ std::string format_verdict(const Verdict &verdict, const Design &design, int dig
             + with_digits(verdict.threshold, digits) + "," + std::to_string(verdict.iterations)
             + "," + with_digits(verdict.bound, digits) + "," + names_of(verdict.excluded, design);
     for (const double value : verdict.suspicion) {
+        line += "," + with_digits(value, digits);
+    }
+    for (const double value : verdict.extra) {
         line += "," + with_digits(value, digits);
     }
     return line + "\n";
@@ -81,7 +87,7 @@ std::string status_text(unsigned outcome, unsigned flags)
 
 std::string format_trace(const Trace &trace, const Design &design, int digits)
 {
-    std::string text = header(design);
+    std::string text = header(trace, design);
     for (const Verdict &verdict : trace.verdicts) {
         text += format_verdict(verdict, design, digits);
     }

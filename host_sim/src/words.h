@@ -22,7 +22,8 @@ const char *outcome_word(unsigned outcome);
 std::string status_text(unsigned outcome, unsigned flags);
 
 /** A trace as CSV: k,t_s,status,<states>,statistic,threshold,iterations,bound,excluded,
- *  suspicion:<sensor>... with that many significant digits; `excluded` is joined by ;. */
+ *  suspicion:<sensor>... and the method's own columns, with that many significant digits;
+ *  `excluded` is joined by ;. */
 std::string format_trace(const Trace &trace, const Design &design, int digits);
 
 } // namespace sim

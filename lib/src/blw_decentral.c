@@ -20,10 +20,10 @@ static size_t mem_len_of(const blw_decentral_model_t *model)
 
 static void bind(blw_decentral_t *self, blw_real_t *mem)
 {
-    const blw_decentral_model_t *const model = self->model;
-    const size_t                       n     = model->head.plant->n;
-    const size_t                       m     = model->head.plant->m;
-    const size_t                       mu    = model->mu;
+    const blw_decentral_model_t *const model  = self->model;
+    const size_t                       n      = model->head.plant->n;
+    const size_t                       m      = model->head.plant->m;
+    const size_t                       mu     = model->mu;
     const bool                         steady = model->steady != NULL;
 
     self->x_hat     = blw_la_take(&mem, n);
@@ -128,8 +128,8 @@ static void innovate(blw_decentral_t *self, const blw_real_t *y, blw_mask_t used
             }
             continue;
         }
-        const blw_real_t nu = (y[i] - plant->offset[i])
-                            - blw_la_dot(plant->n, &plant->C[i * plant->n], self->x_bar);
+        const blw_real_t nu =
+            (y[i] - plant->offset[i]) - blw_la_dot(plant->n, &plant->C[i * plant->n], self->x_bar);
         const blw_real_t e = blw_la_abs(nu) * model->scale[i];
         self->nu[i]        = (e > INNOVATION_MAX) ? (nu * (INNOVATION_MAX / e)) : nu;
         self->suspicion[i] = blw_step_suspicion(e * e);
@@ -185,22 +185,13 @@ static void count_calm(blw_decentral_t *self)
     }
 }
 
-/* The filter of an excluded sensor need not forget the attack: its state becomes the estimate's. */
-static void reseed(blw_decentral_t *self)
-{
-    blw_decentral_leave_out(self, self->set);
-    blw_la_copy(self->model->mu, self->z, self->delta);
-    self->calm = 0U;
-}
-
 /* Leave out sensors that fell silent, unless an attacked one is: silence is no lie. */
 static void leave_out_silent(blw_decentral_t *self, blw_mask_t silent)
 {
     const blw_decentral_sets_t *const sets = self->model->sets;
     const bool                        free = (self->set == 0U) || (self->calm >= CALM_STEPS);
 
-    if (free && self->usable
-        && ((silent & ~blw_decentral_members(sets, self->set)) != 0U)) {
+    if (free && self->usable && ((silent & ~blw_decentral_members(sets, self->set)) != 0U)) {
         exclude(self, blw_decentral_cover(sets, silent));
     }
 }
@@ -242,7 +233,7 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
     leave_out_silent(self, silent);
     const blw_real_t g = blw_decentral_statistic(self, self->set);
     blw_decentral_estimate(self, self->set);
-    out->statistic = (self->set == 0U) ? g : blw_decentral_all_statistic(self, self->set);
+    out->statistic  = (self->set == 0U) ? g : blw_decentral_all_statistic(self, self->set);
     const bool pass = out->statistic <= out->threshold;
     count_passes(self, pass, used);
     if (warming_up(self)) {
@@ -314,12 +305,13 @@ blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, cons
     innovate(self, y, used);
     blw_decentral_advance(self);
     const blw_outcome_t outcome = decide(self, used, out);
-    used = update(self, used);
     count_calm(self);
     if ((self->model->reseed != 0U) && (self->calm >= CALM_STEPS)
         && !(out->statistic <= out->threshold)) {
-        reseed(self);
+        blw_decentral_steady_reseed(self, self->set);
+        self->calm = 0U;
     }
+    used = update(self, used);
     report(self, outcome, used, out);
     return BLW_OK;
 }

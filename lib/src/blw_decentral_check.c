@@ -27,8 +27,8 @@ static bool set_ok(const blw_decentral_model_t *model, size_t set)
     const size_t                      parent = sets->parent[set];
 
     return (parent < set) && (sets->sensor[set] < model->head.plant->m)
-        && ((parent == 0U) || (sets->sensor[parent] < sets->sensor[set]))
-        && (blw_decentral_rows(model, set) <= model->rows);
+           && ((parent == 0U) || (sets->sensor[parent] < sets->sensor[set]))
+           && (blw_decentral_rows(model, set) <= model->rows);
 }
 
 static bool sets_ok(const blw_decentral_model_t *model)
@@ -120,23 +120,37 @@ static void add_common(const blw_decentral_model_t *model, blw_table_check_t *ch
     blw_table_add(check, ranking->c, ranked * knots);
     if (check->ok) {
         check->ok = positive(plant->m, model->scale) && positive(ranking->n_dof, ranking->thr)
-                 && growing(knots, ranking->knots);
+                    && growing(knots, ranking->knots);
     }
 }
 
-/* Numbers of F (or S), of Q, and whether `at` fits the sets; @return false if it does not. */
-static bool steady_sizes(const blw_decentral_model_t *model, size_t *len_F, size_t *len_Q)
-{
-    const blw_decentral_steady_t *const steady = model->steady;
+/* Numbers of the tables that are kept per sensor. */
+typedef struct lengths {
+    size_t F; /* or S */
+    size_t Q;
+    size_t H;
+} lengths_t;
 
-    *len_F = 0U;
-    *len_Q = 0U;
+static lengths_t lengths_of(const blw_decentral_model_t *model)
+{
+    const size_t d   = (size_t)model->mu - model->head.plant->n;
+    lengths_t    len = {0U, 0U, 0U};
+
     for (size_t i = 0U; i < model->head.plant->m; i++) {
         const size_t mu  = blw_decentral_mu(model, i);
         const size_t end = model->first[i + 1U];
-        *len_F += mu * mu;
-        *len_Q += mu * ((end < steady->d) ? end : steady->d);
+        len.F += mu * mu;
+        len.Q += mu * ((end < d) ? end : d);
+        len.H += blw_la_packed_row(mu);
     }
+    return len;
+}
+
+/* Whether `at` fits the sets. */
+static bool removals_ok(const blw_decentral_model_t *model)
+{
+    const blw_decentral_steady_t *const steady = model->steady;
+
     if ((steady->at == NULL) || (steady->at[0] != 0U)) {
         return false;
     }
@@ -157,19 +171,19 @@ static void add_steady(const blw_decentral_model_t *model, blw_table_check_t *ch
     const size_t                        n      = model->head.plant->n;
     const size_t                        mu     = model->mu;
     const size_t                        d      = mu - n;
-    size_t                              len_F;
-    size_t                              len_Q;
+    const lengths_t                     len    = lengths_of(model);
 
-    if ((steady->d != d) || !steady_sizes(model, &len_F, &len_Q)) {
+    if ((steady->d != d) || !removals_ok(model)) {
         check->ok = false;
         return;
     }
-    blw_table_add(check, steady->F, len_F);
+    blw_table_add(check, steady->F, len.F);
     blw_table_add(check, steady->K, mu);
     blw_table_add(check, steady->N, (d * mu) - ((d * (d - 1U)) / 2U));
     blw_table_add(check, steady->Psi, n * mu);
-    blw_table_add(check, steady->Q, len_Q);
+    blw_table_add(check, steady->Q, len.Q);
     blw_table_add(check, steady->Y, mu * n);
+    blw_table_add(check, steady->H, (model->reseed != 0U) ? len.H : 0U);
     blw_table_add(check, steady->M, steady->at[model->sets->n_sets]);
 }
 
@@ -179,12 +193,8 @@ static void add_recursive(const blw_decentral_model_t *model, blw_table_check_t 
     const size_t                           n         = model->head.plant->n;
     const size_t                           m         = model->head.plant->m;
     const size_t                           mu        = model->mu;
-    size_t                                 len_S     = 0U;
 
-    for (size_t i = 0U; i < m; i++) {
-        len_S += blw_decentral_mu(model, i) * blw_decentral_mu(model, i);
-    }
-    blw_table_add(check, recursive->S, len_S);
+    blw_table_add(check, recursive->S, lengths_of(model).F);
     blw_table_add(check, recursive->t, mu);
     blw_table_add(check, recursive->V, mu * n);
     blw_table_add(check, recursive->E, blw_la_packed_row(m));

@@ -47,6 +47,8 @@ void       blw_decentral_steady_advance(blw_decentral_t *self);
 blw_real_t blw_decentral_steady_statistic(blw_decentral_t *self, size_t set);
 void       blw_decentral_steady_estimate(blw_decentral_t *self, size_t set);
 blw_real_t blw_decentral_steady_all_statistic(blw_decentral_t *self, size_t set);
+/** (5) for the sensors of the set of the last estimate(). */
+void blw_decentral_steady_reseed(blw_decentral_t *self, size_t set);
 
 void       blw_decentral_recursive_reset(blw_decentral_t *self);
 void       blw_decentral_recursive_advance(blw_decentral_t *self);

@@ -100,8 +100,8 @@ static void predict_factor(blw_decentral_t *self, size_t sensor, const blw_real_
         blw_real_t *const row = &self->X[(first + r) * width];
         blw_la_fill(width, BLW_R(0.0), row);
         for (size_t b = 0U; b < mu; b++) {
-            blw_la_axpy(first + b + 1U, S[(r * mu) + b],
-                        &self->L[blw_la_packed_row(first + b)], row);
+            blw_la_axpy(first + b + 1U, S[(r * mu) + b], &self->L[blw_la_packed_row(first + b)],
+                        row);
         }
         blw_la_copy(n, &model->recursive->V[(first + r) * n], &row[model->mu]);
     }
@@ -124,9 +124,8 @@ static void correct_factor(blw_decentral_t *self, size_t sensor)
     for (size_t r = 0U; r < mu; r++) {
         blw_la_axpy(used, t[r], &self->X[(first + r) * width], a);
     }
-    const blw_real_t per_S = BLW_R(1.0)
-                           / (blw_la_dot(used, a, a) + blw_la_dot(sensor + 1U, E, E));
-    const blw_real_t nu = self->nu[sensor] - blw_la_dot(mu, t, &self->z[first]);
+    const blw_real_t per_S = BLW_R(1.0) / (blw_la_dot(used, a, a) + blw_la_dot(sensor + 1U, E, E));
+    const blw_real_t nu    = self->nu[sensor] - blw_la_dot(mu, t, &self->z[first]);
     for (size_t r = 0U; r < mu; r++) {
         blw_real_t *const row = &self->X[(first + r) * width];
         const blw_real_t  K   = blw_la_dot(used, row, a) * per_S;

@@ -68,7 +68,7 @@ static void extend(blw_decentral_t *self, size_t set, size_t before)
     }
     for (size_t r = mu; r-- > 0U;) { /* from below, since row r needs q_0 .. q_r */
         t_b[r] = blw_la_dot(r + 1U, &T[blw_la_packed_row(r)], t_b)
-               + blw_la_dot(before, &X[r * before], self->t);
+                 + blw_la_dot(before, &X[r * before], self->t);
     }
 }
 
@@ -161,4 +161,33 @@ blw_real_t blw_decentral_steady_all_statistic(blw_decentral_t *self, size_t set)
         put_back(self, sets->sensor[rest]);
     }
     return blw_la_dot(self->model->steady->d, self->w, self->w);
+}
+
+/* delta_i = -R_i^-1 s_i; estimate() has left s in self->t. */
+static void reseed_sensor(blw_decentral_t *self, size_t sensor, const blw_real_t *s)
+{
+    const blw_decentral_model_t *const model = self->model;
+    const size_t                       mu    = blw_decentral_mu(model, sensor);
+    blw_real_t *const                  delta = &self->delta[model->first[sensor]];
+    const blw_real_t                  *H     = model->steady->H;
+
+    for (size_t i = 0U; i < sensor; i++) {
+        H = &H[blw_la_packed_row(blw_decentral_mu(model, i))];
+    }
+    blw_la_fill(mu, BLW_R(0.0), delta);
+    for (size_t r = 0U; r < mu; r++) {
+        blw_la_axpy(r + 1U, -s[r], &H[blw_la_packed_row(r)], delta);
+    }
+}
+
+void blw_decentral_steady_reseed(blw_decentral_t *self, size_t set)
+{
+    const blw_decentral_model_t *const model  = self->model;
+    size_t                             before = blw_decentral_rows(model, set);
+
+    for (size_t rest = set; rest != 0U; rest = model->sets->parent[rest]) {
+        const size_t sensor = model->sets->sensor[rest];
+        before -= blw_decentral_mu(model, sensor);
+        reseed_sensor(self, sensor, &self->t[before]);
+    }
 }

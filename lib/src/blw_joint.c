@@ -103,8 +103,8 @@ blw_real_t blw_joint_innovation(const blw_joint_t *self, size_t i, size_t j)
 {
     const size_t     n      = self->plant.n;
     const size_t     sensor = self->model->sensor[self->model->first[i] + j];
-    const blw_real_t e      = self->nu[sensor]
-                       - blw_la_dot(n, &self->plant.C[sensor * n], &self->delta[i * n]);
+    const blw_real_t e =
+        self->nu[sensor] - blw_la_dot(n, &self->plant.C[sensor * n], &self->delta[i * n]);
 
     return (j == 0U) ? (e - self->theta[i]) : e;
 }
@@ -114,10 +114,9 @@ static void innovate(blw_joint_t *self, const blw_real_t *y, blw_mask_t heard)
     const size_t n = self->plant.n;
 
     for (size_t j = 0U; j < self->plant.m; j++) {
-        self->nu[j] = blw_joint_in(heard, j)
-                        ? ((y[j] - self->plant.offset[j])
-                           - blw_la_dot(n, &self->plant.C[j * n], self->x_bar))
-                        : BLW_R(0.0);
+        self->nu[j] = blw_joint_in(heard, j) ? ((y[j] - self->plant.offset[j])
+                                                - blw_la_dot(n, &self->plant.C[j * n], self->x_bar))
+                                             : BLW_R(0.0);
     }
 }
 
@@ -291,8 +290,7 @@ blw_status_t blw_joint_set_plant(blw_joint_t *self, const blw_real_t *A, const b
 
 static size_t ops_mem_len(const blw_model_t *model)
 {
-    if ((model == NULL) || (model->plant == NULL)
-        || (model->method != (uint8_t)BLW_METHOD_JOINT)) {
+    if ((model == NULL) || (model->plant == NULL) || (model->method != (uint8_t)BLW_METHOD_JOINT)) {
         return 0U;
     }
     return mem_len_of((const blw_joint_model_t *)model);

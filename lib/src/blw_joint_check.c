@@ -26,7 +26,7 @@ static bool local_ok(const blw_joint_model_t *model, size_t i, blw_mask_t *weak)
         seen |= (blw_mask_t)1U << sensor;
     }
     const size_t own = blw_joint_weak(model, i);
-    const bool   new = !blw_joint_in(*weak, own);
+    const bool new   = !blw_joint_in(*weak, own);
     *weak |= (blw_mask_t)1U << own;
     return new;
 }
@@ -106,7 +106,7 @@ blw_status_t blw_joint_check(const blw_joint_model_t *model)
     if (!check.ok || !all_above(model->scale, model->r, BLW_R(0.0))) {
         return BLW_ERR_MODEL;
     }
-    const bool sound = (model->schedule != NULL) ? schedule_ok(model, &check)
-                                                 : recursive_ok(model, &check);
+    const bool sound =
+        (model->schedule != NULL) ? schedule_ok(model, &check) : recursive_ok(model, &check);
     return sound ? blw_model_end(&model->head, &check) : BLW_ERR_MODEL;
 }

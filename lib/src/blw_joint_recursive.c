@@ -180,8 +180,8 @@ static void correct_local(blw_joint_t *self, const columns_t *at, size_t i, blw_
         correct_rows(self, at, i, Y, self->e[taken]);
         taken++;
     }
-    self->sd[i] = blw_la_norm(at->width, &self->X[((i * (self->plant.n + 2U)) + self->plant.n)
-                                                  * at->width]);
+    self->sd[i] =
+        blw_la_norm(at->width, &self->X[((i * (self->plant.n + 2U)) + self->plant.n) * at->width]);
     keep_rows(self, at, i);
 }
 
@@ -197,14 +197,14 @@ static void factor(blw_joint_t *self, const columns_t *at)
         const blw_real_t  norm  = some ? blw_la_sqrt(norm2) : BLW_R(0.0);
         const blw_real_t  per   = some ? (BLW_R(1.0) / norm) : BLW_R(0.0);
 
-        self->c[row]                             = q[at->now + (row / (n + 2U))];
+        self->c[row]                          = q[at->now + (row / (n + 2U))];
         self->L[blw_la_packed_row(row) + row] = norm;
         for (size_t column = 0U; column < at->now; column++) {
             q[column] *= per;
         }
         for (size_t below = row + 1U; below < at->rows; below++) {
-            blw_real_t *const v = &self->X[below * at->width];
-            const blw_real_t  k = blw_la_dot(at->now, v, q);
+            blw_real_t *const v                     = &self->X[below * at->width];
+            const blw_real_t  k                     = blw_la_dot(at->now, v, q);
             self->L[blw_la_packed_row(below) + row] = k;
             blw_la_axpy(at->now, -k, q, v);
         }
@@ -254,17 +254,37 @@ static void fusion_row(const blw_joint_t *self, const columns_t *at, size_t i, s
         add_row(self, at, ref, (ref * (n + 2U)) + a, BLW_R(-1.0), row);
         row[value] -= self->delta[(ref * n) + a];
     }
-    row[value + 1U] = BLW_REAL_EPS * blw_la_max(blw_la_dot(value, row, row),
-                                                square_of(self, (ref * (n + 2U)) + a));
+    row[value + 1U] =
+        BLW_REAL_EPS
+        * blw_la_max(blw_la_dot(value, row, row), square_of(self, (ref * (n + 2U)) + a));
+}
+
+/* Take what lies along row `row` out of those of x_ref and of the differences after it. */
+static void project_out(blw_joint_t *self, const columns_t *at, size_t row)
+{
+    const size_t            n     = self->plant.n;
+    const size_t            value = at->w;
+    const blw_real_t *const v     = &self->X[row * at->width];
+    const blw_real_t        norm2 = blw_la_dot(value, v, v);
+
+    if (!(norm2 > blw_la_max(v[value + 1U], SQUARE_MIN))) {
+        return;
+    }
+    const blw_real_t per = BLW_R(1.0) / norm2;
+    for (size_t other = 0U; other < (self->model->r * n); other++) {
+        blw_real_t *const w = &self->X[other * at->width];
+        if ((other < n) || (other > row)) {
+            blw_la_axpy(value + 1U, -(blw_la_dot(value, w, v) * per), v, w);
+        }
+    }
 }
 
 /* dx of (4): rows 0..n-1 are those of x_ref, the others differences to it. */
 static void fuse(blw_joint_t *self, const columns_t *at)
 {
-    const size_t n     = self->plant.n;
-    const size_t value = at->w;
-    const size_t rows  = self->model->r * n;
-    const size_t ref   = best_local(self);
+    const size_t n    = self->plant.n;
+    const size_t rows = self->model->r * n;
+    const size_t ref  = best_local(self);
 
     for (size_t row = 0U; row < rows; row++) {
         const size_t turn = row / n;
@@ -272,21 +292,10 @@ static void fuse(blw_joint_t *self, const columns_t *at)
         fusion_row(self, at, i, ref, row % n, &self->X[row * at->width]);
     }
     for (size_t row = n; row < rows; row++) {
-        const blw_real_t *const v     = &self->X[row * at->width];
-        const blw_real_t        norm2 = blw_la_dot(value, v, v);
-        if (!(norm2 > blw_la_max(v[value + 1U], SQUARE_MIN))) {
-            continue;
-        }
-        const blw_real_t per = BLW_R(1.0) / norm2;
-        for (size_t other = 0U; other < rows; other++) {
-            blw_real_t *const w = &self->X[other * at->width];
-            if ((other < n) || (other > row)) {
-                blw_la_axpy(value + 1U, -(blw_la_dot(value, w, v) * per), v, w);
-            }
-        }
+        project_out(self, at, row);
     }
     for (size_t a = 0U; a < n; a++) {
-        self->dx[a] = self->X[(a * at->width) + value];
+        self->dx[a] = self->X[(a * at->width) + at->w];
     }
 }
 

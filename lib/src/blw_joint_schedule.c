@@ -11,13 +11,13 @@ void blw_joint_schedule_reset(blw_joint_t *self)
 /* (2), (3) of one estimator; all innovations are taken before the state changes. */
 static void correct_local(blw_joint_t *self, size_t i, const blw_real_t *K, blw_mask_t heard)
 {
-    const size_t            n     = self->plant.n;
-    const size_t            m_i   = blw_joint_sensors(self->model, i);
-    blw_real_t *const       x     = &self->delta[i * n];
-    const uint16_t *const   list  = &self->model->sensor[self->model->first[i]];
-    blw_real_t *const       move  = self->scratch;
-    blw_real_t              theta = BLW_R(0.0);
-    blw_real_t              phi   = BLW_R(0.0);
+    const size_t          n     = self->plant.n;
+    const size_t          m_i   = blw_joint_sensors(self->model, i);
+    blw_real_t *const     x     = &self->delta[i * n];
+    const uint16_t *const list  = &self->model->sensor[self->model->first[i]];
+    blw_real_t *const     move  = self->scratch;
+    blw_real_t            theta = BLW_R(0.0);
+    blw_real_t            phi   = BLW_R(0.0);
 
     blw_la_fill(n, BLW_R(0.0), move);
     for (size_t j = 0U; j < m_i; j++) {

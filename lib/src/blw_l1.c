@@ -85,11 +85,12 @@ size_t blw_l1_worst(const blw_l1_t *self)
 {
     const blw_l1_model_t *const m     = self->model;
     const blw_real_t            z     = blw_la_norm(m->d, self->z);
+    const blw_real_t            tau   = BLW_L1_SLACK_TAU * blw_la_norm(m->N, self->tau);
     blw_real_t                  worst = BLW_R(1.0);
     size_t                      found = m->n_groups;
 
     for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t limit = m->c[g] + (BLW_L1_SLACK * (m->c[g] + z));
+        const blw_real_t limit = m->c[g] + (BLW_L1_SLACK * (m->c[g] + z)) + tau;
         const blw_real_t ratio = blw_l1_norm(m, g, self->l) / limit;
         if ((ratio > worst) && !blw_l1_in_support(self, g)) {
             worst = ratio;

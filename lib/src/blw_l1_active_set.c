@@ -5,9 +5,8 @@
  * objective never rises; the end is verified with z and l formed anew from tau. */
 #include "blw_l1_internal.h"
 
-/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end;
- * and low enough for either if full passes do not lower it any more, because the rounding of tau turns
- * the direction of a very short nu_g. */
+/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end; and
+ * low enough for either if full passes do not lower it any more, because tau is rounded. */
 #define RESIDUAL_ENTER   BLW_R(1e-4)
 #define RESIDUAL_FINAL   (BLW_R(4.0) * BLW_L1_SLACK)
 #define RESIDUAL_STALLED (BLW_R(8192.0) * BLW_REAL_EPS)

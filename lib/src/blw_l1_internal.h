@@ -8,6 +8,9 @@
 /* Slack of the tests on (4), relative to c_g + |z|: what rounding leaves of l = Z z. */
 #define BLW_L1_SLACK (BLW_R(64.0) * BLW_REAL_EPS)
 
+/* The same, relative to |tau|: what rounding leaves of z = Z' tau, most of which is G x. */
+#define BLW_L1_SLACK_TAU (BLW_R(4.0) * BLW_REAL_EPS)
+
 /* Row i of the trapezoid Z and its length. */
 static inline const blw_real_t *blw_l1_row(const blw_l1_model_t *m, size_t i, size_t *len)
 {

@@ -78,7 +78,8 @@ blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, b
     self->xi        = (model->P != NULL) ? blw_la_take(&mem, l1->N) : self->zeta;
     self->x_hat     = blw_la_take(&mem, plant->n);
     self->x_bar     = blw_la_take(&mem, plant->n);
-    self->y         = blw_la_take(&mem, plant->m);
+    self->d         = blw_la_take(&mem, plant->n);
+    self->e         = blw_la_take(&mem, plant->m);
     self->suspicion = blw_la_take(&mem, plant->m);
     blw_l1_init(&self->l1, l1, mem);
     return blw_lasso_reset(self, NULL);
@@ -95,7 +96,7 @@ blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0)
         return BLW_ERR_ARG;
     }
     blw_la_copy(plant->n, start, self->x_hat);
-    blw_jordan_reset(self->model->jordan, plant->n, start, self->zeta);
+    blw_la_fill(self->model->l1->N, BLW_R(0.0), self->zeta);
     blw_l1_reset(&self->l1);
     return BLW_OK;
 }
@@ -113,25 +114,47 @@ static bool transform_sensor(blw_lasso_t *self, size_t i)
     return blw_la_bounded(r, zeta_i) && blw_la_bounded(r, xi_i);
 }
 
-/* All local filters to step k.  A filter that a sample throws out of bounds starts again from the
- * prediction, and the sample counts as missing: zeta = G x without noise, and the filter forgets
- * its start.  @return the samples that were taken in. */
-static blw_mask_t advance_filters(blw_lasso_t *self, const blw_real_t *u, blw_mask_t used)
+/* All local filters to step k, on the innovations.  A filter that a sample throws out of bounds
+ * starts again from the prediction, and the sample counts as missing.
+ * @return the samples that were taken in. */
+static blw_mask_t advance_filters(blw_lasso_t *self, blw_mask_t used)
 {
     const blw_jordan_model_t *const jordan = self->model->jordan;
     const size_t                    r      = jordan->r;
-    const size_t                    n      = self->model->head.plant->n;
     blw_mask_t                      taken  = used;
 
-    blw_jordan_step(jordan, u, self->y, self->zeta);
+    blw_jordan_step(jordan, NULL, self->e, self->zeta);
     for (size_t i = 0U; i < jordan->m; i++) {
         if (!transform_sensor(self, i)) {
-            blw_la_gemv(r, n, &jordan->G[i * r * n], self->x_bar, &self->zeta[i * r]);
+            blw_la_fill(r, BLW_R(0.0), &self->zeta[i * r]);
             (void)transform_sensor(self, i);
             taken &= ~((blw_mask_t)1U << i);
         }
     }
     return taken;
+}
+
+/* (2) and (3): the estimate, which is the reference of the next step.
+ * @return false if the fusion overflowed: the estimate is then the prediction. */
+static bool move_reference(blw_lasso_t *self)
+{
+    const blw_jordan_model_t *const jordan = self->model->jordan;
+    const size_t                    n      = self->model->head.plant->n;
+
+    for (size_t j = 0U; j < n; j++) {
+        self->x_hat[j] = self->x_bar[j] + self->d[j];
+    }
+    if (!blw_la_bounded(n, self->x_hat)) {
+        blw_la_copy(n, self->x_bar, self->x_hat);
+        return false;
+    }
+    for (size_t j = 0U; j < n; j++) {
+        self->d[j] = self->x_hat[j] - self->x_bar[j]; /* what rounding has left of d */
+    }
+    for (size_t i = 0U; i < self->model->l1->N; i++) {
+        self->zeta[i] -= blw_la_dot(n, &jordan->G[i * n], self->d);
+    }
+    return true;
 }
 
 static void judge_sensors(blw_lasso_t *self, blw_mask_t used)
@@ -188,14 +211,14 @@ blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_re
     blw_mask_t    used = blw_plant_screen(plant, y, valid);
 
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
-    blw_plant_fill(plant, y, used, self->x_bar, self->y);
-    used = advance_filters(self, u, used);
-    blw_l1_solve(&self->l1, self->xi, self->x_hat, &info);
-    if (!blw_la_bounded(plant->n, self->x_hat)) {
-        blw_la_copy(plant->n, self->x_bar, self->x_hat); /* overflow in the fusion: predict */
-        used = 0U;
-    }
+    blw_plant_innovate(plant, y, used, self->x_bar, self->e);
+    used = advance_filters(self, used);
+    blw_l1_solve(&self->l1, self->xi, self->d, &info);
     judge_sensors(self, used);
+    if (!move_reference(self)) {
+        used = 0U;
+        judge_sensors(self, used);
+    }
     report(self, &info, used, out);
     return BLW_OK;
 }

@@ -135,14 +135,14 @@ void blw_plant_predict(const blw_plant_t *plant, const blw_real_t *x, const blw_
     }
 }
 
-void blw_plant_fill(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid,
-                    const blw_real_t *x_bar, blw_real_t *out)
+void blw_plant_innovate(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid,
+                        const blw_real_t *x_bar, blw_real_t *e)
 {
     for (size_t i = 0U; i < plant->m; i++) {
+        e[i] = BLW_R(0.0);
         if (((valid >> i) & 1U) != 0U) {
-            out[i] = y[i] - plant->offset[i];
-        } else {
-            out[i] = blw_la_dot(plant->n, &plant->C[i * plant->n], x_bar);
+            const blw_real_t y_bar = blw_la_dot(plant->n, &plant->C[i * plant->n], x_bar);
+            e[i]                   = (y[i] - plant->offset[i]) - y_bar;
         }
     }
 }

@@ -18,8 +18,32 @@ SOURCES = ("blw_la", "blw_model", "blw_step", "blw_bank", "blw_bank_check", "blw
 FLAGS = ["-std=c99", "-ffp-contract=off", "-O2", "-fPIC", "-shared"]
 METHOD_BANK = 6
 
-KALMAN, CONVERGED, BOUND, HELD = range(4)
-MISSING, DEGRADED, BLIND, WARMING_UP = 1, 2, 4, 8
+MISSING, DEGRADED = 1, 2  # BLW_FLAG_...
+
+# Steps through a whole record: a call through ctypes takes longer than a step.
+LOOP = """
+#include <string.h>
+#include "blw/blw_bank.h"
+int record(blw_bank_t *bank, const blw_real_t *y, const blw_real_t *u, size_t steps, size_t tests,
+           blw_real_t *x, blw_real_t *averages, blw_real_t *statistic, int *verdict)
+{
+    const blw_plant_t *plant = bank->model->head.plant;
+    for (size_t k = 0U; k < steps; k++) {
+        blw_estimator_out_t out;
+        const int status = blw_bank_step(bank, (u != NULL) ? &u[k * plant->l] : NULL,
+                                         &y[k * plant->m], BLW_MASK_ALL(plant->m), &out);
+        if (status != BLW_OK) {
+            return status;
+        }
+        memcpy(&x[k * plant->n], out.x_hat, plant->n * sizeof *x);
+        memcpy(&averages[k * tests], bank->average, tests * sizeof *x);
+        statistic[k] = out.statistic;
+        verdict[2U * k] = (int)out.outcome;
+        verdict[(2U * k) + 1U] = (int)out.excluded;
+    }
+    return 0;
+}
+"""
 
 
 def compile_library(folder: Path, width: str) -> Path:
@@ -28,10 +52,12 @@ def compile_library(folder: Path, width: str) -> Path:
     if compiler is None:
         pytest.skip("no C compiler")
     target = folder / f"bank_{width}.so"
+    loop = folder / "loop.c"
+    loop.write_text(LOOP)
     define = ["-DBLW_REAL_DOUBLE"] if width == "f64" else []
     files = [str(LIB / "src" / f"{name}.c") for name in SOURCES]
     subprocess.run([compiler, *FLAGS, *define, f"-I{LIB / 'include'}", f"-I{LIB / 'src'}", *files,
-                    "-lm", "-o", str(target)], check=True)
+                    str(loop), "-lm", "-o", str(target)], check=True)
     return target
 
 
@@ -122,23 +148,22 @@ class BankLibrary:
         return np.array(self.out.x_hat[:self.n], dtype=float)
 
     def run(self, y, u=None):
-        """x_hat [steps, n], outcome, excluded and statistic [steps] over y [steps, m]."""
-        steps = len(y)
+        """x_hat [steps, n], outcome, excluded, statistic [steps] and averages [steps, tests]."""
+        steps, tests = len(y), self.model.sets * self.model.per_set * self.model.groups
+        pointer = ct.POINTER(self.real)
+
+        def where(array):
+            return None if array is None else array.ctypes.data_as(pointer)
+
         y = np.ascontiguousarray(y, dtype=self.dtype)
-        u = None if u is None else np.ascontiguousarray(u, dtype=self.dtype)
-        x = np.empty((steps, self.n))
-        outcome, excluded = np.empty(steps, int), np.empty(steps, int)
-        statistic = np.empty(steps)
-        valid = ct.c_uint64((1 << self.m) - 1)
-        bank, out, pointer = ct.byref(self.self), ct.byref(self.out), ct.POINTER(self.real)
-        for k in range(steps):
-            u_k = None if u is None else u[k].ctypes.data_as(pointer)
-            status = self.lib.blw_bank_step(bank, u_k, y[k].ctypes.data_as(pointer), valid, out)
-            assert status == 0
-            x[k] = self.out.x_hat[:self.n]
-            outcome[k], excluded[k] = self.out.outcome, self.out.excluded
-            statistic[k] = self.out.statistic
-        return x, outcome, excluded, statistic
+        u = np.ascontiguousarray(u, dtype=self.dtype) if self.l else None
+        x, averages = np.empty((steps, self.n), self.dtype), np.empty((steps, tests), self.dtype)
+        statistic, verdict = np.empty(steps, self.dtype), np.empty((steps, 2), np.intc)
+        status = self.lib.record(ct.byref(self.self), where(y), where(u), ct.c_size_t(steps),
+                                 ct.c_size_t(tests), where(x), where(averages), where(statistic),
+                                 verdict.ctypes.data_as(ct.POINTER(ct.c_int)))
+        assert status == 0
+        return (x.astype(float), *verdict.T, statistic.astype(float), averages.astype(float))
 
     def _array(self, values):
         if values is None:

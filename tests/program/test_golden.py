@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from blw.build import simulator
-from blw.design import design_all, document, json_text
+from blw.design import Design, design_all, document, json_text
 from blw.model import Model, parse
 
 SHARED = Path(os.environ.get("BULWARK_SHARED", Path(__file__).parents[3] / "shared"))
@@ -68,8 +68,16 @@ def build(golden: dict[str, Any], options: dict[str, Any]) -> Model:
 def replayed(
     folder: Path, golden: dict[str, Any], model: Model, precision: str, method: str = "lasso"
 ) -> list[dict[str, str]]:
+    return replay(folder, golden, design_all(model, ["kalman", "lasso"]), precision, method)
+
+
+def replay(
+    folder: Path, golden: dict[str, Any], designed: Design, precision: str, method: str
+) -> list[dict[str, str]]:
+    """What the simulator makes of the golden measurements, one row per y."""
+    model = designed.model
     design, log = folder / "golden.json", folder / "log.csv"
-    design.write_text(json_text(document(design_all(model, ["kalman", "lasso"]))))
+    design.write_text(json_text(document(designed)))
     with log.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["k", "t_s", *model.sensors, *model.inputs])
@@ -80,7 +88,7 @@ def replayed(
     subprocess.run([simulator(precision), "replay", log, "--design", design, "--method", method,
                     "--out", folder / "out"], check=True, capture_output=True, timeout=300)
     with (folder / "out" / f"{method}.csv").open(newline="") as file:
-        return list(csv.DictReader(file))[1:]
+        return [row for row in csv.DictReader(file) if row["k"] != "0"]
 
 
 def estimates(golden: dict[str, Any], rows: list[dict[str, str]]) -> np.ndarray:

@@ -58,6 +58,9 @@ static const blw_real_t decentral_Q[5] = {BLW_R(1.0), BLW_R(-0.5), BLW_R(0.86602
                                           BLW_R(-0.5), BLW_R(-0.86602540378443865)};
 static const blw_real_t decentral_Y[3] = {BLW_R(0.40824829046386302), BLW_R(0.40824829046386302),
                                           BLW_R(0.40824829046386302)};
+/* 1 / R_i: R_i = 2/sqrt6, and by the signs of Q the same for all */
+static const blw_real_t decentral_H[3] = {BLW_R(1.2247448713915890), BLW_R(1.2247448713915890),
+                                          BLW_R(1.2247448713915890)};
 /* {0, 1}: X = 1/sqrt3, T = 2/sqrt3, since Q_0' Q_1 = -1/2 */
 static const blw_real_t decentral_M[2] = {BLW_R(0.57735026918962576), BLW_R(1.1547005383792515)};
 static const blw_real_t decentral_S[3] = {BLW_R(0.5), BLW_R(0.5), BLW_R(0.5)};
@@ -73,8 +76,7 @@ static inline void decentral_seal(decentral_made_t *made)
     blw_table_add(&check, made->model.scale, 3U);
     blw_table_add(&check, made->ranking.thr, made->ranking.n_dof);
     blw_table_add(&check, made->ranking.knots, made->ranking.n_knots);
-    blw_table_add(&check, made->ranking.c,
-                  (size_t)made->ranking.n_ranked * made->ranking.n_knots);
+    blw_table_add(&check, made->ranking.c, (size_t)made->ranking.n_ranked * made->ranking.n_knots);
     if (made->model.steady != NULL) {
         blw_table_add(&check, made->steady.F, 3U);
         blw_table_add(&check, made->steady.K, 3U);
@@ -82,6 +84,7 @@ static inline void decentral_seal(decentral_made_t *made)
         blw_table_add(&check, made->steady.Psi, 3U);
         blw_table_add(&check, made->steady.Q, 5U);
         blw_table_add(&check, made->steady.Y, 3U);
+        blw_table_add(&check, made->steady.H, (made->model.reseed != 0U) ? 3U : 0U);
         blw_table_add(&check, made->steady.M, made->at[n_sets]);
     } else {
         blw_table_add(&check, made->recursive.S, 3U);
@@ -96,25 +99,26 @@ static inline void decentral_seal(decentral_made_t *made)
 
 static inline void decentral_point(decentral_made_t *made)
 {
-    made->sets    = (blw_decentral_sets_t){.n_sets       = 5U,
-                                           .n_candidates = 3U,
-                                           .parent       = made->parent,
-                                           .sensor       = made->sensor,
-                                           .candidate    = made->candidate};
-    made->ranking = (blw_decentral_ranking_t){.n_dof   = 3U,
-                                              .removed = made->removed,
-                                              .thr     = made->thr,
-                                              .knots   = made->knots,
-                                              .c       = made->c};
-    made->steady  = (blw_decentral_steady_t){.d   = 2U,
-                                             .F   = decentral_F,
-                                             .K   = decentral_K,
-                                             .N   = decentral_N,
-                                             .Psi = decentral_third,
-                                             .Q   = decentral_Q,
-                                             .Y   = decentral_Y,
-                                             .at  = made->at,
-                                             .M   = decentral_M};
+    made->sets      = (blw_decentral_sets_t){.n_sets       = 5U,
+                                             .n_candidates = 3U,
+                                             .parent       = made->parent,
+                                             .sensor       = made->sensor,
+                                             .candidate    = made->candidate};
+    made->ranking   = (blw_decentral_ranking_t){.n_dof   = 3U,
+                                                .removed = made->removed,
+                                                .thr     = made->thr,
+                                                .knots   = made->knots,
+                                                .c       = made->c};
+    made->steady    = (blw_decentral_steady_t){.d   = 2U,
+                                               .F   = decentral_F,
+                                               .K   = decentral_K,
+                                               .N   = decentral_N,
+                                               .Psi = decentral_third,
+                                               .Q   = decentral_Q,
+                                               .Y   = decentral_Y,
+                                               .H   = decentral_H,
+                                               .at  = made->at,
+                                               .M   = decentral_M};
     made->recursive = (blw_decentral_recursive_t){.S   = decentral_S,
                                                   .t   = decentral_one,
                                                   .V   = decentral_zero,

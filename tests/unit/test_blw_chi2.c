@@ -62,7 +62,7 @@ static void test_init_given_bad_arguments_refuses(void)
 {
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_chi2_init(NULL, &model, mem, WINDOW));
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_chi2_init(&det, NULL, mem, WINDOW));
-    TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_chi2_init(&det, &model, NULL, W));
+    TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_chi2_init(&det, &model, NULL, WINDOW));
     assert_refused(BLW_ERR_MEM, WINDOW - 1U);
 }
 

@@ -74,7 +74,7 @@ static void test_step_given_one_attacked_sensor_leaves_it_out(void)
         const blw_real_t a     = BLW_R(1000.0);
         const blw_real_t nu[3] = {(i == 0U) ? a : BLW_R(2.0), (i == 1U) ? a : BLW_R(2.0),
                                   (i == 2U) ? a : BLW_R(4.0)};
-        const double     other = (i == 2U) ? 1.0 : 1.5; /* mean of delta = nu / 2 */
+        const double other = (i == 2U) ? 1.0 : 1.5; /* mean of delta = nu / 2 */
 
         TEST_ASSERT_EQUAL_INT(BLW_OK, blw_decentral_reset(&filter, NULL));
         step_nu(nu[0], nu[1], nu[2], 7U);
@@ -91,8 +91,8 @@ static void test_step_given_attack_over_readmits_after_the_passes_in_a_row(void)
 {
     step_nu(BLW_R(100.0), BLW_R(0.0), BLW_R(0.0), 7U); /* delta_0 = 50, g = 1667, then / 16 */
     TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
-    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 7U); /* delta_0 = 12.5, g = 104 */
-    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 7U); /* g = 6.5: passes */
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 7U);  /* delta_0 = 12.5, g = 104 */
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 7U);  /* g = 6.5: passes */
     step_nu(BLW_R(60.0), BLW_R(0.0), BLW_R(0.0), 7U); /* again: counts from 0 */
     TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
     quiet_steps(2U); /* g = 39, 2.5 */
@@ -176,9 +176,22 @@ static void test_search_given_degrees_of_freedom_compares_g_plus_c(void)
                                 blw_decentral_statistic(&filter, 1U));
         TEST_ASSERT_REAL_WITHIN(5000.0 * SUPPORT_TOL, (double)g[i] + offset[i],
                                 blw_decentral_score(&made.model, 1U, g[i]));
-        TEST_ASSERT_EQUAL_size_t((g[i] > BLW_R(0.0)) ? 2U : 1U, blw_decentral_search(&filter, 0U, &compared));
+        TEST_ASSERT_EQUAL_size_t((g[i] > BLW_R(0.0)) ? 2U : 1U,
+                                 blw_decentral_search(&filter, 0U, &compared));
         TEST_ASSERT_EQUAL_UINT(3U, compared);
     }
+}
+
+static void test_score_given_values_far_out_keeps_their_order(void)
+{
+    const blw_real_t far[2] = {BLW_R(1e30), BLW_R(1.001e30)};
+
+    made.ranking.n_ranked = 1U;
+    made.ranking.n_knots  = 3U;
+    TEST_ASSERT_TRUE(blw_decentral_score(&made.model, 1U, far[0])
+                     < blw_decentral_score(&made.model, 2U, far[1]));
+    TEST_ASSERT_TRUE(blw_decentral_score(&made.model, 1U, BLW_R(5000.0))
+                     < blw_decentral_score(&made.model, 2U, BLW_R(5001.0)));
 }
 
 static void test_statistic_given_a_set_of_two_leaves_nothing_to_test(void)
@@ -254,6 +267,7 @@ int main(void)
     RUN_TEST(test_step_given_every_set_fails_reports_the_best_and_says_so);
     RUN_TEST(test_step_given_no_candidates_keeps_all_sensors_and_says_so);
     RUN_TEST(test_search_given_degrees_of_freedom_compares_g_plus_c);
+    RUN_TEST(test_score_given_values_far_out_keeps_their_order);
     RUN_TEST(test_statistic_given_a_set_of_two_leaves_nothing_to_test);
     RUN_TEST(test_step_given_recursive_gains_yields_hand_computed_estimate);
     RUN_TEST(test_step_given_recursive_gains_and_an_attack_leaves_it_out);

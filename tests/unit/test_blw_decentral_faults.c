@@ -51,8 +51,7 @@ static void test_init_given_null_or_little_memory_refuses(void)
     assert_refused(BLW_ERR_MEM, MEM - 1U);
     decentral_make(&made, true);
     assert_refused(BLW_ERR_MEM, MEM_RECURSIVE - 1U);
-    TEST_ASSERT_EQUAL_INT(BLW_OK,
-                          blw_decentral_init(&filter, &made.model, mem, MEM_RECURSIVE));
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_decentral_init(&filter, &made.model, mem, MEM_RECURSIVE));
 }
 
 static void test_init_given_a_wrong_head_or_sum_refuses(void)
@@ -324,7 +323,8 @@ static void test_ops_given_the_interface_reach_the_same_functions(void)
     TEST_ASSERT_EQUAL_size_t(0U, ops->mem_len(NULL));
     other.plant = NULL;
     TEST_ASSERT_EQUAL_size_t(0U, ops->mem_len(&other));
-    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_init(&filter.base, ops, &made.model.head, mem, MEM));
+    TEST_ASSERT_EQUAL_INT(BLW_OK,
+                          blw_estimator_init(&filter.base, ops, &made.model.head, mem, MEM));
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_reset(&filter.base, NULL));
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_step(&filter.base, NULL, calm, 7U, &out));
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, out.x_hat[0]);

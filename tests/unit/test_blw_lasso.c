@@ -179,8 +179,8 @@ static void test_step_given_canonical_tables_transforms_every_sensor_by_its_own_
     made.model.P = P;
     support_lasso_seal(&made);
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_lasso_init(&filter, &made.model, mem, MEM_P));
-    step(benign, 7U); /* xi = 13, 6, 5.5: mu = 6.25, nu_0 = 5.75 */
-    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 3.125, out.x_hat[0]);
+    step(benign, 7U); /* about x_bar: zeta = 0.5, 0, -0.5, xi = 1, 0, -0.5, x_hat = 3 + 0.5/6 */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 37.0 / 12.0, out.x_hat[0]);
 }
 
 static void test_step_given_equal_weights_flags_ambiguity_unless_the_certificate_holds(void)

@@ -236,16 +236,16 @@ static void test_predict_given_a_state_that_leaves_the_bounds_starts_again_from_
     }
 }
 
-static void test_fill_given_gaps_takes_the_offset_off_and_predicts_the_rest(void)
+static void test_innovate_given_gaps_leaves_them_at_their_prediction(void)
 {
     const blw_real_t y[3]     = {BLW_R(11.0), support_nan, BLW_R(13.0)};
     const blw_real_t x_bar[1] = {BLW_R(7.0)};
     blw_real_t       out[3];
 
-    blw_plant_fill(&made.plant, y, 5U, x_bar, out);
-    TEST_ASSERT_REAL_WITHIN(0.0, 10.0, out[0]);
-    TEST_ASSERT_REAL_WITHIN(0.0, 7.0, out[1]);
-    TEST_ASSERT_REAL_WITHIN(0.0, 10.0, out[2]);
+    blw_plant_innovate(&made.plant, y, 5U, x_bar, out);
+    TEST_ASSERT_REAL_WITHIN(0.0, 3.0, out[0]);
+    TEST_ASSERT_REAL_WITHIN(0.0, 0.0, out[1]);
+    TEST_ASSERT_REAL_WITHIN(0.0, 3.0, out[2]);
 }
 
 static void test_mask_count_given_masks_counts_their_bits(void)
@@ -279,7 +279,7 @@ int main(void)
     RUN_TEST(test_screen_given_the_most_sensors_reaches_the_last_bit);
     RUN_TEST(test_predict_given_two_states_and_inputs_yields_hand_computed_state);
     RUN_TEST(test_predict_given_a_state_that_leaves_the_bounds_starts_again_from_x0);
-    RUN_TEST(test_fill_given_gaps_takes_the_offset_off_and_predicts_the_rest);
+    RUN_TEST(test_innovate_given_gaps_leaves_them_at_their_prediction);
     RUN_TEST(test_mask_count_given_masks_counts_their_bits);
     return UNITY_END();
 }

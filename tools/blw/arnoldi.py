@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Orthonormal basis of the subspace that one sensor observes, by a shifted, scaled Arnoldi iteration.
+"""Orthonormal basis of the subspace that one sensor observes: shifted, scaled Arnoldi iteration.
 
-The rows c, c A, c A^2, ... lose their rank to rounding long before n = 10.  The same space is spanned
-by the Krylov vectors of M = A' - sigma I, sigma = tr(A) / n, in coordinates in which A is balanced;
-Arnoldi keeps them orthogonal, and the iteration breaks down exactly when the space is exhausted.
+The rows c, c A, c A^2, ... lose their rank to rounding long before n = 10.  The same space is
+spanned by the Krylov vectors of M = A' - sigma I, sigma = tr(A) / n, in coordinates in which A is
+balanced; Arnoldi keeps them orthogonal, and the iteration breaks down exactly when the space is
+exhausted.
 """
 
 import numpy as np

@@ -19,7 +19,7 @@ from blw.tables import Struct, index, real, table
 
 NAME = "bank"
 
-CEILING = 2.0             # of an average over its threshold: it recovers in about half a memory
+CEILING = 1.5             # of an average over its threshold: it recovers in a third of the memory
 SETTLED = 0.01            # part of P_opt that the initial error may still hold
 UNKNOWN_START = 1e4       # times P: the initial error covariance that is provided for without P0
 MAX_WARM_UP = 60000

@@ -48,23 +48,24 @@ class Noise:
         return vectors * np.sqrt(np.clip(values, 0.0, None))
 
 
-def powers(A: Array, count: int) -> list[Array]:
-    """I, A, ..., A^(count-1)."""
-    found = [np.eye(len(A))]
+def power_stack(A: Array, count: int) -> Array:
+    """[count, n, n] I, A, ..., A^(count-1), by doubling."""
+    found, next_power = np.eye(len(A))[None], A
     while len(found) < count:
-        found.append(A @ found[-1])
-    return found
+        found = np.concatenate([found, found @ next_power])
+        next_power = next_power @ next_power
+    return found[:count]
 
 
 def observability_matrix(A: Array, C: Array, horizon: int) -> Array:
     """[C; C A; ...; C A^(horizon-1)]."""
-    return np.vstack([C @ power for power in powers(A, horizon)])
+    return np.vstack([C @ power for power in power_stack(A, horizon)])
 
 
 def block_response(noise: Noise, subset: tuple[int, ...], horizon: int) -> Array:
     """[h theta, h (n+m)] response of the outputs of a block to xi(t), ..., xi(t+h-1): [B] (18)."""
     n, m, theta = len(noise.W), len(noise.R), len(subset)
-    C, rows = noise.C[list(subset)], powers(noise.A, horizon)
+    C, rows = noise.C[list(subset)], power_stack(noise.A, horizon)
     response = np.zeros((horizon, theta, horizon, n + m))
     for j in range(horizon):
         response[j, np.arange(theta), j, n + np.array(subset)] = 1.0
@@ -107,14 +108,14 @@ class Residue:
         """[count, n, n] Gamma(0), Gamma(1), ... of (3)."""
         h, weighted = len(self.N), self.N @ self.joint
         with_error = self.T @ self.P  # E rho(t) e(t+tau)', advanced with tau
-        found = np.empty((count, *self.P.shape))
-        for tau in range(count):
-            found[tau] = with_error @ self.T.T
-            with_error = with_error @ self.Phi.T
-            if tau < h:
-                found[tau] += np.tensordot(weighted[tau:], self.N[:h - tau], ((0, 2), (0, 2)))
-                with_error += weighted[tau] @ self.E.T
-        return found
+        found = np.empty((min(count, h), *self.P.shape))
+        for tau in range(len(found)):
+            direct = np.tensordot(weighted[tau:], self.N[:h - tau], ((0, 2), (0, 2)))
+            found[tau] = with_error @ self.T.T + direct
+            with_error = with_error @ self.Phi.T + weighted[tau] @ self.E.T
+        if count <= h:
+            return found
+        return np.concatenate([found, with_error @ power_stack(self.Phi.T, count - h) @ self.T.T])
 
     def mean(self) -> float:
         """E q: [B] (19) without epsilon."""

@@ -74,8 +74,8 @@ def survival_offset(dof: float, reference: float) -> Callable[[Array], Array]:
 
 
 def density_offset(dof: float) -> Callable[[Array], Array]:
-    """The same for the density, which [D] maximises; g + c(g) = -2 log p(g) has no inverse."""
-    return lambda g: -2.0 * log_pdf(np.maximum(g, 1e-3), dof) - g
+    """The same for the density p, which [D] maximises: g + c(g) = -2 log p(g), for g >= dof / 8."""
+    return lambda g: -2.0 * log_pdf(np.maximum(g, dof / 8.0), dof) - g
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,15 +96,14 @@ def offsets(functions: Sequence[Callable[[Array], Array]], dof: float) -> Offset
     """Tables of the given c on common knots; dof is the largest that occurs.
 
     An interval is halved until c is right in its middle.  Where every survival probability is
-    close to 1, c need not be: its error counts by the slope of -2 log P(chi2(dof) > g).  Nor far
-    out, where g itself is large.
+    close to 1, c need not be: its error counts by the slope of -2 log P(chi2(dof) > g + c).  Nor
+    far out, where g itself is large.
     """
     knots = np.array([0.0, 0.25 * dof, 0.5 * dof, dof, 2.0 * dof, LAST_KNOT])
     while len(knots) < MAX_KNOTS:
         middle = (knots[1:] + knots[:-1]) / 2.0
-        slope = 2.0 * np.exp(log_pdf(middle, dof) - log_sf(middle, dof))
-        missed = [np.abs(f(middle) - (f(knots[1:]) + f(knots[:-1])) / 2.0) for f in functions]
-        error = np.max(missed, axis=0) * slope / (1.0 + middle / (4.0 * dof))
+        error = np.max([_missed(f, knots, middle, dof) for f in functions], axis=0)
+        error /= 1.0 + middle / (4.0 * dof)
         if error.max() <= TOLERANCE:
             break
         knots = np.sort(np.append(knots, middle[error.argmax()]))
@@ -131,6 +130,14 @@ def detector(S: Array, window: int = WINDOW, rates: Sequence[float] = COMMON_RAT
         "rate": table(rates, "[n_rates] false-alarm rates"),
         "thr": table(thresholds, "[n_rates x W] thresholds"),
     })
+
+
+def _missed(f: Callable[[Array], Array], knots: Array, middle: Array, dof: float) -> Array:
+    """How far a line between neighbouring knots misses f in the middle, as a probability."""
+    exact = f(middle)
+    score = np.maximum(middle + exact, 1e-3)
+    slope = 2.0 * np.exp(log_pdf(score, dof) - log_sf(score, dof))
+    return slope * np.abs(exact - (f(knots[1:]) + f(knots[:-1])) / 2.0)
 
 
 def _log_tail(a: float, x: Array) -> Array:

@@ -20,6 +20,7 @@ COMMANDS = {
     "replay": "blw.simulate:replay",
     "report": "blw.report.command:report",
     "import": "blw.importer:import_",
+    "joint": "blw.joint_command:joint_group",
     "doctor": "blw.doctor:doctor",
     "test": "blw.testing:test",
 }

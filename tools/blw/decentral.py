@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Method `decentral`: one filter per sensor, chi-square test, subset search; tables of blw_decentral.h.
+"""Method `decentral`: one filter per sensor, chi-square test, search; tables of blw_decentral.h.
 
 [D] with two corrections: the statistic has mu_J - n degrees of freedom, and an excluded sensor can
 come back.  `variant = "printed"` keeps mu_J, the density in place of the survival probability, the
@@ -17,8 +17,16 @@ import scipy.linalg
 
 from blw import chi2
 from blw.decentral_filters import LocalFilters, local_filters, warm_up
-from blw.decentral_fusion import (Fusion, Node, candidates, check_redundancy, cholesky,
-                                  excluded_sets, fuse, removal_tree)
+from blw.decentral_fusion import (
+    Fusion,
+    Node,
+    candidates,
+    check_redundancy,
+    cholesky,
+    excluded_sets,
+    fuse,
+    removal_tree,
+)
 from blw.design import Designed
 from blw.errors import DesignError
 from blw.kalman import Kalman
@@ -76,7 +84,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     ranking = _Ranking(model, filters, tree, options)
     P0 = kalman.P if model.P0 is None else model.P0
     steady = options.gains == "steady"
-    engine = (_steady_struct(filters, fusion, tree) if steady
+    engine = (_steady_struct(filters, fusion, tree, options.reseed) if steady
               else _recursive_struct(model, filters, fusion, P0))
     mu = int(filters.first[-1])
     tables = Struct("blw_decentral_model_t", NAME, {
@@ -116,7 +124,7 @@ class _Ranking:
         self.removed = ranked + others
         base = int(filters.first[-1]) - (0 if printed else model.n)
         self.dof = [base - gone for gone in self.removed]
-        self.thr = [chi2.threshold(self.false_alarm, dof) for dof in self.dof]
+        self.thr = [chi2.threshold(self.false_alarm, max(dof, 1)) for dof in self.dof]
         self.offsets = None
         if len(ranked) > 1:
             dofs = self.dof[:len(ranked)]
@@ -168,11 +176,13 @@ def _sets_struct(model: Model, tree: list[Node]) -> Struct:
     })
 
 
-def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node]) -> Struct:
+def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node],
+                   reseed: bool) -> Struct:
     mu, first = int(filters.first[-1]), filters.first
     d = len(fusion.N)
     upper = [fusion.N[r, r:] for r in range(d)]
     Q = [fusion.Q[i][:fusion.rows(first, i)].T.ravel() for i in range(len(filters.S))]
+    H = [np.linalg.inv(R).T[np.tril_indices(len(R))] for R in fusion.R] if reseed else [[]]
     M = [np.concatenate([node.X.ravel(), node.T[np.tril_indices(len(node.T))]])
          if len(node.sensors) > 1 else np.zeros(0) for node in tree]
     at = np.cumsum([0] + [len(part) for part in M])
@@ -187,6 +197,7 @@ def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node]) -> S
         "Psi": table(fusion.Psi, "[n x mu] x_hat = Psi z"),
         "Q": table(np.concatenate(Q), "[mu_i x min(first[i + 1], d)] per sensor, N_i = Q_i R_i"),
         "Y": table(np.hstack(fusion.Y).T, "[mu x n] stacked Y_i'"),
+        "H": table(np.concatenate(H), "R_i^-1 transposed, packed lower, per sensor"),
         "at": index(at, "[n_sets + 1] where the part of a set in M begins"),
         "M": table(np.concatenate(M), "X, then T packed lower, per set of two or more"),
     })

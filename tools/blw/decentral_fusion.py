@@ -7,8 +7,8 @@ With P = L L' and the QR decomposition L^-1 Phi = [Q1 Q2] [R1; 0],
 
 with d = mu - n degrees of freedom; N is made upper trapezoidal by rotating its rows.  Leaving the
 sensors e out of (24) is the same as estimating an unknown offset of their z.  With N_i = Q_i R_i
-(thin) for every sensor and an orthonormal basis [Q_a Q_b' ...] of the columns of N_e built up sensor
-by sensor,
+(thin) for every sensor and an orthonormal basis [Q_a Q_b' ...] of the columns of N_e built up
+sensor by sensor,
 
     t_a = Q_a' w,   t_b = T Q_b' w + X t,   ...   g_J = |w|^2 - |t|^2                          (2)
     x_J = Psi z - sum_i Y_i s_i,   Y_i = Psi_i R_i^-1,   s_b = T' t_b,   t += X' t_b, ...       (3)
@@ -37,11 +37,13 @@ _UNSEEN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Fusion:
-    """(1): Psi [n, mu], N [d, mu] upper trapezoidal; per sensor Q [d, mu_i], Y [n, mu_i]."""
+    """(1): Psi [n, mu], N [d, mu] upper trapezoidal; per sensor N_i = Q_i R_i, Q [d, mu_i],
+    R [mu_i, mu_i] upper triangular, and Y [n, mu_i]."""
 
     Psi: Array
     N: Array
     Q: list[Array]
+    R: list[Array]
     Y: list[Array]
 
     def rows(self, first: Array, i: int) -> int:
@@ -76,7 +78,7 @@ def fuse(filters: LocalFilters) -> Fusion:
     factors = [np.linalg.qr(N[:, filters.rows(i)]) for i in range(len(filters.S))]
     Y = [solve_triangular(factor.R.T, Psi[:, filters.rows(i)].T, lower=True).T
          for i, factor in enumerate(factors)]
-    return Fusion(Psi, N, [factor.Q for factor in factors], Y)
+    return Fusion(Psi, N, [factor.Q for factor in factors], [factor.R for factor in factors], Y)
 
 
 def cholesky(filters: LocalFilters) -> Array:

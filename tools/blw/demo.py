@@ -8,7 +8,7 @@ import click
 from blw.build import BUILD, PRECISIONS, ROOT
 from blw.simulate import run_scenario
 
-SCENARIO = ROOT / "host_sim" / "scenarios" / "liu5_bias.toml"
+SCENARIO = ROOT / "host_sim" / "scenarios" / "pendulum_loop.toml"
 
 
 @click.command()

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_discrete_lyapunov
 
 from blw import kalman
 from blw.errors import DesignError
@@ -26,6 +27,7 @@ Array = NDArray[np.float64]
 MAX_STEPS = 20000
 CONVERGED = 1e-13    # relative change of a step that is taken for rounding
 SETTLED = 1e-10      # the same for covariances under given gains
+PULSE_STEPS = 20     # after a false sample, in which the largest error lies
 EQUAL = 1.02         # variances whose ratio is below are called equal
 CONDITION = 1e9      # growth of a covariance that is taken for divergence
 
@@ -99,18 +101,31 @@ def performance(model: Model, pairs: Sequence[Pair], step: Step, variance: Array
     return Performance(local, fused, recursion.theta_variance.copy())
 
 
-def pulse_error(step: Step, benign: Performance, size: float) -> Array:
-    """[r] mean squared error of theta in the first step of an attack of that size."""
-    missed = np.array([1 - K[-1, 0] for K in step.gains.K])
-    return (size * missed) ** 2 + benign.theta
+def pulse_errors(model: Model, pairs: Sequence[Pair], step: Step, size: float,
+                 length: int) -> Array:
+    """[length, r] mean squared errors of theta from one false sample of that size on, with fixed
+    gains and no other attack."""
+    stack = Stack(model, pairs)
+    mean = np.zeros((length, len(pairs)))
+    Aa = stack.Aa[stack.state(0), stack.state(0)]
+    for i, (C, K, Gamma) in enumerate(zip(stack.C, step.gains.K, step.gains.Gamma, strict=True)):
+        X, phi = np.zeros(model.n + 1), 0.0
+        for k in range(length):
+            attack = size if k == 0 else 0.0
+            X = Aa @ X
+            X[-1] += phi
+            innovation = C[:, -1] * attack - C @ X
+            X, phi = X + K @ innovation, phi + Gamma @ innovation
+            mean[k, i] = attack - X[-1]
+    return mean**2 + performance(model, pairs, step, np.zeros(len(pairs))).theta
 
 
 def sweep(model: Model, pairs: Sequence[Pair], P0: Array, etas: Sequence[float], size: float,
           printed: bool = False) -> list[dict[str, Any]]:
     """State and attack-signal errors of every compensation factor, for an attack of that size.
 
-    `white` is the attack with the variance size^2 on all weak sensors, `pulse` its first sample
-    after none.
+    `white` is the attack with the variance size^2 on all weak sensors, `pulse` one false sample:
+    the largest mean squared error at or after it.
     """
     rows = []
     for eta in etas:
@@ -123,7 +138,7 @@ def sweep(model: Model, pairs: Sequence[Pair], P0: Array, etas: Sequence[float],
             "state_white": white.fused,
             "theta_benign": benign.theta.tolist(),
             "theta_white": white.theta.tolist(),
-            "theta_pulse": pulse_error(step, benign, size).tolist(),
+            "theta_pulse": pulse_errors(model, pairs, step, size, PULSE_STEPS).max(axis=0).tolist(),
         })
     return rows
 
@@ -151,13 +166,24 @@ def strong_filter(model: Model, strong: Sequence[int]) -> float | None:
     return float(np.trace(found.P))
 
 
-def central_filter(model: Model, pairs: Sequence[Pair], eta: Array) -> float:
-    """tr P of one Kalman filter on all their sensors, eta added to the noise of the weak ones."""
+def central_filter(model: Model, pairs: Sequence[Pair], eta: Array,
+                   actual: Array | None = None) -> float:
+    """tr P of one Kalman filter on all their sensors, eta [r] added to the noise of the weak ones.
+
+    actual  [r] variances of white attacks that it meets; default: eta
+    """
     rows = sorted({sensor for pair in pairs for sensor in pair.sensors})
-    extra = np.zeros(model.m)
-    extra[[pair.weak for pair in pairs]] = eta
-    R = (model.R + np.diag(extra))[np.ix_(rows, rows)]
-    return float(np.trace(kalman.steady_state(model.A, model.C[rows], model.W, R).P))
+
+    def noise(variance: Array) -> Array:
+        extra = np.zeros(model.m)
+        extra[[pair.weak for pair in pairs]] = variance
+        return (model.R + np.diag(extra))[np.ix_(rows, rows)]
+
+    K = kalman.steady_state(model.A, model.C[rows], model.W, noise(eta)).K
+    R = noise(eta if actual is None else actual)
+    keep = np.eye(model.n) - K @ model.C[rows]
+    P = solve_discrete_lyapunov(keep @ model.A, keep @ model.W @ keep.T + K @ R @ K.T)
+    return float(np.trace(P))
 
 
 def verdict(names: Sequence[str], fused: float, strong: float | None, central: float) -> str:

@@ -5,13 +5,13 @@ Local estimator i has the state X_i = [x; theta_i], theta_i the attack on its we
 input phi_i(k) = theta_i(k) - theta_i(k-1).  With d_i(k) = phi_i(k) - phi_hat_i(k-1) its errors obey
 
     e_i(k)  = Aa X~_i(k-1) + Wa(k-1) + Phi d_i(k),    y~_i(k) = Ca_i e_i(k) + v_i(k)
-    X~_i(k) = e_i(k) - K_i y~_i(k),                   phi_hat_i(k) = phi_hat_i(k-1) + Gamma_i y~_i(k)
+    X~_i(k) = e_i(k) - K_i y~_i(k),    phi_hat_i(k) = phi_hat_i(k-1) + Gamma_i y~_i(k)
 
 theta is taken as white with the variance eta.  The matrices of all estimators are stacked, so that
 one set of formulas gives the covariances (15)-(19) and, off the diagonal, the cross-covariances
 (45)-(50).  Corrections: (19) with Xi1 = 4 eta I - eta (Gamma^a + Gamma^a') + V(k-1), and
 (45)-(49) with the covariance R_ij of the noises that two estimators share.  The `printed` variant
-has neither; of it only the symbol of (19) that cannot be meant, {Gamma_i}', is read as {Gamma_i^a}'.
+has neither; only the symbol of (19) that cannot be meant, {Gamma_i}', is read as {Gamma_i^a}'.
 """
 
 from collections.abc import Sequence

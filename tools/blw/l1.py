@@ -186,6 +186,8 @@ def union_bound(reduced_form: Reduced, groups: Groups, gamma: float) -> float:
     missed = 0.0
     for first, last, c_g in zip(groups.first[:-1], groups.first[1:], c):
         largest = np.linalg.eigvalsh(S[first:last, first:last])[-1]
+        if largest <= 0.0:
+            continue  # nothing redundant: the multiplier is always 0
         if last - first == 1:
             missed += float(scipy.special.erfc(c_g / np.sqrt(2.0 * largest)))
         else:

@@ -6,7 +6,7 @@ A module has NAME, a dataclass Options, and design(model, kalman, options) -> De
 
 from types import ModuleType
 
-from blw import bank, canonical, decentral, kalman, lasso
+from blw import bank, canonical, decentral, joint, kalman, lasso
 
 REGISTRY: dict[str, ModuleType] = {module.NAME: module for module in (
     kalman,
@@ -14,4 +14,5 @@ REGISTRY: dict[str, ModuleType] = {module.NAME: module for module in (
     canonical,
     decentral,
     bank,
+    joint,
 )}

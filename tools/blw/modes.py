@@ -28,8 +28,10 @@ BASIS_COND = 1e5
 #: A cluster's eigenvectors: singular values of T - lambda I below this, relative to max(1, |T|).
 EIGENVECTOR = 1e-7
 
-#: A mode is unseen if no more than this part of the measurement row lies along it.
+#: A mode is unseen if the terms of C_i v cancel but for this part of them,
 UNSEEN = 1e-9
+#: and an entry of v is zero if it is no more than this part of the balanced vector.
+ROUNDING = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,7 @@ class Mode:
     """One eigenvalue (of a conjugate pair: the upper one) and what the sensors see of it."""
 
     eigenvalue: complex
-    rows: Array  #: [m x d] C V, each row relative to its sensor's size; zero rows are exact
+    rows: Array  #: [m x d] C V; what nothing is seen of is exactly 0
     multiplicity: int
 
     @property
@@ -69,20 +71,19 @@ class Modes:
         """[n] scale of the states that balances A, so that their units do not matter."""
         return np.diag(matrix_balance(self.A, permute=False)[1])
 
-    def relative(self, vectors: Array) -> Array:
-        """[m x k] |C_i v| of the vectors [n x k], 1 if v and C_i are parallel; unseen ones are 0."""
-        balanced = vectors / self.units[:, None]
-        rows = self.C * self.units
-        size = np.maximum(np.linalg.norm(rows, axis=1), np.finfo(float).tiny)
-        seen = (rows / size[:, None]) @ (balanced / np.linalg.norm(balanced, axis=0))
-        return np.where(np.abs(seen) > UNSEEN, seen, 0.0)
+    def visible(self, vectors: Array) -> Array:
+        """[m x k] C v of the vectors [n x k] without what is only rounding."""
+        balanced = np.abs(vectors / self.units[:, None])
+        clean = np.where(balanced > ROUNDING * np.linalg.norm(balanced, axis=0), vectors, 0.0)
+        value = self.C @ clean
+        return np.where(np.abs(value) > UNSEEN * (np.abs(self.C) @ np.abs(clean)), value, 0.0)
 
     @cached_property
     def modes(self) -> list[Mode]:
         """Every eigenvalue once, complex pairs by their upper one."""
         found = []
         for block, U, T in zip(self.form.blocks, self.form.bases, self.form.compressions):
-            rows = self.relative(U @ _eigenvectors(T))
+            rows = self.visible(U @ _eigenvectors(T))
             found.append(Mode(block.eigenvalue, rows, block.multiplicity))
         return found
 
@@ -106,7 +107,7 @@ class Modes:
     def observed(self) -> Array:
         """[m x n] whether sensor i observes Jordan coordinate j: a chain from its first visible
         vector on."""
-        visible = self.relative(self.X) != 0.0
+        visible = self.visible(self.X) != 0.0
         for block in self.form.blocks:
             step = block.size // block.length
             links = visible[:, block.rows].reshape(len(visible), block.length, step).any(axis=2)

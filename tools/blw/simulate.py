@@ -23,6 +23,7 @@ from blw.model import load
 from blw.progress import steps
 
 BAD_INPUT = 2
+EXISTING_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 EVERY_METHOD = "all"
 
 
@@ -36,6 +37,8 @@ def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
         click.option("--seed", type=click.IntRange(min=0), help="Seed of the random numbers."),
         click.option("--precision", type=click.Choice(PRECISIONS), default="f32",
                      show_default=True, help="Numbers of the library: float or double."),
+        click.option("--compare", is_flag=True,
+                     help="Also the filters that joint is compared with in its paper."),
         click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON."),
     )):
         command = option(command)
@@ -43,7 +46,7 @@ def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
 
 
 @click.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
+@click.argument("scenario", type=EXISTING_FILE)
 @_shared_options
 @click.option("--runs", type=click.IntRange(min=1), help="Number of runs, each with its own seed.")
 def run(scenario: Path, **options: Any) -> int:
@@ -52,15 +55,15 @@ def run(scenario: Path, **options: Any) -> int:
 
 
 @click.command()
-@click.argument("log", type=click.Path(path_type=Path))
-@click.option("--design", required=True, type=click.Path(path_type=Path),
+@click.argument("log", type=EXISTING_FILE)
+@click.option("--design", required=True, type=EXISTING_FILE,
               help="NAME.json of the design command.")
 @_shared_options
 @click.option("--format", "log_format", type=click.Choice(("csv",)), default="csv",
               show_default=True, help="Format of the log.")
-@click.option("--map", "column_map", type=click.Path(path_type=Path), metavar="MAP.toml",
+@click.option("--map", "column_map", type=EXISTING_FILE, metavar="MAP.toml",
               help="Columns of a foreign CSV.")
-@click.option("--attack", type=click.Path(path_type=Path), metavar="ATTACK.toml",
+@click.option("--attack", type=EXISTING_FILE, metavar="ATTACK.toml",
               help="Attack to inject; an attacks.json works too.")
 @click.option("--attack-id", metavar="ID", help="Only that attack of the file.")
 def replay(log: Path, design: Path, column_map: Path | None, log_format: str,

@@ -5,8 +5,10 @@
  *      G(k) = g(k-w+1) + ... + g(k)  ~  chi2(p w),   w = min(k, W),                           (1)
  *  and the detector alarms unless  G(k) <= thr[w-1] = F^-1(1 - alpha; p w).                   (2)
  *
- *  tools/bulwark design computes L^-1 and thr[] for several rates alpha, so a step needs no division
- *  and no libm.  A NaN fails (2): bad data alarm.  Reentrant: all that changes is in *self and mem.
+ *  tools/bulwark design computes L^-1 and thr[] for several rates alpha, so a step needs no
+ *  division and no libm.  It emits a detector for the innovations of the Kalman filter,
+ *  r = y - offset - C x_bar with x_bar of blw_plant_predict().  A NaN fails (2): bad data alarm.
+ *  Reentrant: all that changes is in *self and mem.
  */
 #ifndef BLW_CHI2_H
 #define BLW_CHI2_H

@@ -1,23 +1,27 @@
 /* SPDX-License-Identifier: MIT */
-/** @file blw_decentral.h  Secure estimation by one Kalman filter per sensor, a chi-square test and a
- *  search over the sets of sensors that may be attacked: method `decentral` [D].
+/** @file blw_decentral.h  One Kalman filter per sensor, a chi-square test and a search over the
+ *  sets of sensors that may be attacked: method `decentral` [D].
  *
  *  Sensor i observes z_i = Z_i' x (mu_i numbers, mu in all).  Its filter runs on the innovations of
  *  the fused estimate: with x_bar = A x_hat(k-1) + Bu u(k-1) and delta_i = z_i - Z_i' x_bar,
- *      delta_i(k) = F_i delta_i + K_i nu_i,   nu_i = y_i - offset_i - C_i x_bar                (1)
- *      x_hat = x_bar + Psi delta,   delta := delta - Phi Psi delta                           (2)
+ *      delta_i(k) = F_i delta_i + K_i nu_i,   nu_i = y_i - offset_i - C_i x_bar               (1)
+ *      x_hat = x_bar + Psi delta,   delta := delta - Phi Psi delta                            (2)
  *  are (10) and (24) of [D] at noise size, whatever the operating point.  A missing sample has
  *  nu_i = 0: its filter coasts on the prediction.  With w = N delta, white without attack,
  *      g = |w|^2 ~ chi2(mu - n)                                                               (3)
- *  is held against its threshold.  If it fails, the sensors e whose removal leaves the most plausible
- *  g_J (the largest survival probability, J = all others) are left out: with q_i = Q_i' w,
+ *  is held against its threshold.  If it fails, the sensors e whose removal leaves the most
+ *  plausible g_J (the largest survival probability, J = all others) are left out: with q_i = Q_i' w,
  *      g_J = |w|^2 - |t|^2,   x_J = x_bar + Psi delta - sum_i Y_i s_i                         (4)
  *  where t and s follow from the q_i of e (tools/blw/decentral_fusion.py).  Neither depends on
  *  delta_e, which is set to 0 for (4): an attack of any size leaves no rounding error behind.
  *
  *  Excluded sensors come back after `readmit` consecutive steps in which all sensors together pass;
- *  a sensor that is missing for longer than `max_gap` steps is left out until then, too.
- *  With recursive gains P is propagated as a square root P = L L' from P0 and factored on the device.
+ *  a sensor that is missing for longer than `max_gap` steps is left out until then, too.  A filter
+ *  forgets an attack only with its own poles.  Reseeding replaces its state by the estimate of it,
+ *      z_i := Z_i' x_J + E(z_i - Z_i' x | z_J - Phi_J x_J)  or  delta_i := -R_i^-1 s_i,       (5)
+ *  after which all sensors together have the statistic of J.  (Z_i' x_J alone would not do: the
+ *  errors of all local filters stem from the same process noise, and the test knows that.)
+ *  With recursive gains P is propagated as a square root P = L L' from P0, factored on the device.
  */
 #ifndef BLW_DECENTRAL_H
 #define BLW_DECENTRAL_H
@@ -58,6 +62,8 @@ typedef struct blw_decentral_steady {
     const blw_real_t *Psi; /**< [n x mu] */
     const blw_real_t *Q;   /**< per sensor [mu_i x min(first[i + 1], d)] */
     const blw_real_t *Y;   /**< [mu x n] */
+    const blw_real_t *H;   /**< per sensor R_i^-1 of N_i = Q_i R_i, transposed, packed lower; NULL
+                                unless reseed */
     const uint16_t   *at;  /**< [n_sets + 1] where the part of a set in M begins */
     const blw_real_t *M;   /**< per set of r rows and last sensor b: X [mu_b x (r - mu_b)], T packed
                                 lower [mu_b (mu_b + 1) / 2]; nothing for sets of one sensor */
@@ -80,14 +86,14 @@ typedef struct blw_decentral_model {
     uint16_t                         warm_up; /**< steps without a test, while P0 decays */
     uint16_t                         readmit; /**< passes in a row for readmission; 0: never */
     uint16_t                         max_gap; /**< missing steps until a sensor is left out, >= 1 */
-    uint8_t                          reseed;  /**< 1: set delta_i = 0 where an excluded sensor tells
-                                                   the truth again */
+    uint8_t                          reseed;  /**< 1: an excluded sensor that tells the truth again
+                                                   gets a new delta_i, see (5) */
     const uint16_t                  *first;   /**< [m + 1] first row of every sensor, then mu */
     const blw_real_t                *Phi;     /**< [mu x n] stacked Z_i' */
     const blw_real_t                *scale;   /**< [m] nu_i to 1 at its own threshold, > 0 */
     const blw_decentral_sets_t      *sets;
     const blw_decentral_ranking_t   *ranking;
-    const blw_decentral_steady_t    *steady;    /**< one of the two, the other one NULL */
+    const blw_decentral_steady_t    *steady; /**< one of the two, the other one NULL */
     const blw_decentral_recursive_t *recursive;
 } blw_decentral_model_t;
 

@@ -47,13 +47,13 @@ typedef struct blw_joint_recursive {
 
 typedef struct blw_joint_model {
     blw_model_t                  head;
-    uint8_t                      r;       /**< local estimators, 1..m */
-    uint16_t                     warm_up; /**< steps until the initial error has decayed */
-    const uint16_t              *first;   /**< [r + 1] where the sensors of each begin, then M */
-    const uint16_t              *sensor;  /**< [M] the weak sensor of each, then its partners */
-    const uint16_t              *strong;  /**< [m] 1 for a strong sensor, else 0 */
-    const blw_real_t            *scale;   /**< [r] theta to 1 at its threshold, > 0 */
-    const blw_joint_schedule_t  *schedule;  /**< one of the two, the other one NULL */
+    uint8_t                      r;        /**< local estimators, 1..m */
+    uint16_t                     warm_up;  /**< steps until the initial error has decayed */
+    const uint16_t              *first;    /**< [r + 1] where the sensors of each begin, then M */
+    const uint16_t              *sensor;   /**< [M] the weak sensor of each, then its partners */
+    const uint16_t              *strong;   /**< [m] 1 for a strong sensor, else 0 */
+    const blw_real_t            *scale;    /**< [r] theta to 1 at its threshold, > 0 */
+    const blw_joint_schedule_t  *schedule; /**< one of the two, the other one NULL */
     const blw_joint_recursive_t *recursive;
 } blw_joint_model_t;
 

@@ -26,7 +26,7 @@ typedef struct blw_jordan_model {
     const blw_real_t *Jm; /**< [r] J(i, i-1), 0 in the first row */
     const blw_real_t *b;  /**< [m r] */
     const blw_real_t *D;  /**< [m r x l], NULL if l = 0 */
-    const blw_real_t *G;  /**< [m r x n] zeta = G x without noise; used by reset only */
+    const blw_real_t *G;  /**< [m r x n] zeta = G x without noise */
 } blw_jordan_model_t;
 
 /** Add the tables to a walk and check the dimensions against the plant. */

@@ -2,9 +2,14 @@
 /** @file blw_lasso.h  Secure estimation by local filters and l1 fusion: methods `lasso` and
  *  `canonical`.
  *
- *  Every step: missing samples are replaced by C_i (A x_hat + Bu u) (blw_plant_fill), the local
- *  filters take a step (blw_jordan.h), and the fusion (blw_l1.h) returns the Kalman estimate if its
- *  certificate holds and the secure one otherwise.
+ *  The local filters (blw_jordan.h) are linear, so they may run on the deviation from any
+ *  trajectory of the plant; here from the estimate itself, which keeps their states at noise size
+ *  wherever the plant is, and needs no term in u:
+ *      x_bar = A x_hat + Bu u,   zeta_i = J zeta_i + b_i e_i,   e = y - offset - C x_bar      (1)
+ *      x_hat = x_bar + d,   d = fusion of zeta (blw_l1.h)                                     (2)
+ *      zeta  = zeta - G d                                                                     (3)
+ *  A missing sample has e_i = 0, that is, its prediction C_i x_bar stands in for it.  The fusion
+ *  returns the Kalman estimate if its certificate holds and the secure one otherwise.
  *    lasso      zeta in Jordan coordinates of A - K C A                     [L] (12), (31)
  *    canonical  the same filters, fused as P_i zeta_i with P_i G_i = H_i      [N] (17)
  *  The two differ in tables only: P is NULL for lasso.
@@ -31,11 +36,12 @@ typedef struct blw_lasso {
     blw_estimator_t          base;
     const blw_lasso_model_t *model;
     blw_l1_t                 l1;
-    blw_real_t              *zeta;      /* [N] local states */
+    blw_real_t              *zeta;      /* [N] local states about the reference */
     blw_real_t              *xi;        /* [N] P zeta; zeta itself if there is no P */
     blw_real_t              *x_hat;     /* [n] */
     blw_real_t              *x_bar;     /* [n] */
-    blw_real_t              *y;         /* [m] samples without offset, gaps filled */
+    blw_real_t              *d;         /* [n] what the fusion adds to x_bar */
+    blw_real_t              *e;         /* [m] innovations */
     blw_real_t              *suspicion; /* [m] */
 } blw_lasso_t;
 
@@ -43,7 +49,7 @@ typedef struct blw_lasso {
  *  transformed states is not used and may be left out: has_P = 0. */
 #define BLW_LASSO_MEM(n, m, N, d, n_groups, has_P) \
     (BLW_L1_MEM((N), (d), (n_groups)) + ((1U + (size_t)(has_P)) * (size_t)(N)) \
-     + (2U * (size_t)(n)) + (2U * (size_t)(m)))
+     + (3U * (size_t)(n)) + (2U * (size_t)(m)))
 
 /** As blw_estimator_ops.init, for both methods. */
 blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, blw_real_t *mem,

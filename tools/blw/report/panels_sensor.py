@@ -17,8 +17,7 @@ from blw.report.style import Layout
 
 SUSPICION_MAP = LinearSegmentedColormap.from_list(
     "suspicion", ["#ffffff", "#e9e3ee", "#c79ac0", "#8c2f7a", "#3b0f3d"]
-)
-SUSPICION_MAP.set_bad("#c3d3c9")
+).with_extremes(bad="#c3d3c9")
 RIGHT, WRONG, ATTACKED = "#0072b2", "#d55e00", "#d9d3cc"
 
 

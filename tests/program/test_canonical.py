@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: MIT
+"""Method canonical, design tool and simulator, against the reference estimates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import test_golden
+
+from blw import canonical, kalman
+from blw.design import Design, plant_tables
+from blw.jordan_form import JordanForm
+from blw.local_filters import local_filters
+from blw.modes import modes_of
+
+#: Largest error in standard deviations of the Kalman estimate.
+TOLERANCE = {"f64": 1e-6, "f32": 1e-3}
+CASES = [("paper1", "1"), ("paper1", "5"), ("paper1", "30"), ("jordanA", "1"), ("jordanA", "10")]
+
+
+def controllability(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.linalg.matrix_power(A, k) @ b for k in range(b.size)])
+
+
+def reference_transforms(reference: dict, form: JordanForm) -> np.ndarray:
+    """P [m x n x n] of the golden file, whose local filters are (Lam_i, b_i) after P."""
+    local = np.linalg.inv(controllability(form.J, form.b))
+    return np.array([controllability(np.array(Lam), np.array(b)) @ local
+                     for Lam, b in zip(reference["Lam_i"], reference["b_i"])])
+
+
+def design(golden: dict, gamma: str) -> tuple[Design, np.ndarray, np.ndarray]:
+    """The design in the golden file's choice of noise rows; that choice and ours, [m x n x n]."""
+    reference = golden["canonical"]
+    model = test_golden.build(golden, {})
+    gains = kalman.steady_state(model.A, model.C, model.W, model.R)
+    modes, filters = modes_of(model.A, model.C), local_filters(model, gains)
+    P = reference_transforms(reference, filters.form)
+    weights = reference["sensor_weight"]
+    options = canonical.Options(gamma=float(gamma), weights=weights)
+    designed = canonical.assemble(model, gains, options, np.array(weights), filters, modes, P)
+    methods = {"kalman": kalman.design(model, gains, kalman.Options()), "canonical": designed}
+    whole = Design(model, plant_tables(model, gains), methods)
+    return whole, P, canonical.transforms(filters, modes)
+
+
+@pytest.mark.parametrize("precision", ["f64", "f32"])
+@pytest.mark.parametrize(("name", "gamma"), CASES)
+def test_replay_given_golden_measurements_reproduces_reference(
+    tmp_path: Path, name: str, gamma: str, precision: str
+) -> None:
+    golden = test_golden.load(name)
+    whole, *_ = design(golden, gamma)
+    rows = test_golden.replay(tmp_path, golden, whole, precision, "canonical")
+    reference = golden["canonical"]["gamma"][gamma]
+    sigma = np.sqrt(np.diag(golden["kalman"]["P"]))
+    error = np.abs(test_golden.estimates(golden, rows) - reference["x"]) / sigma
+    assert error[np.array(reference["unique"])].max() < TOLERANCE[precision]
+    if precision == "f64":
+        assert [row["status"] == "kalman" for row in rows] == reference["certificate"]
+
+
+@pytest.mark.parametrize("name", ["paper1", "jordanA"])
+def test_transforms_given_golden_model_differ_by_a_rotation_of_noise_rows(name: str) -> None:
+    golden = test_golden.load(name)
+    _, reference, ours = design(golden, "1")
+    H = np.array(golden["canonical"]["H"]).reshape(reference.shape)
+    for P_ref, P_our, H_i in zip(reference, ours, H):
+        change = P_our @ np.linalg.inv(P_ref)
+        noise = ~np.diag(H_i).astype(bool)
+        rotation = change[np.ix_(noise, noise)]
+        expected = np.eye(len(change))
+        expected[np.ix_(noise, noise)] = rotation
+        assert np.abs(change - expected).max() < 1e-9
+        error = rotation @ rotation.T - np.eye(len(rotation))
+        assert np.abs(error).max(initial=0.0) < 1e-9
