@@ -15,8 +15,8 @@ std::vector<Eigen::Index> pair_sensors(const Design &design, const Json &pair)
     const std::string         where = design.path + ": methods.joint.info.pairs";
     std::vector<Eigen::Index> found;
     const auto                add = [&](const Json &name) {
-        found.push_back(
-                           static_cast<Eigen::Index>(design.sensor_index(name.get<std::string>(), where)));
+        const std::size_t sensor = design.sensor_index(name.get<std::string>(), where);
+        found.push_back(static_cast<Eigen::Index>(sensor));
     };
     add(pair.at(0));
     for (const Json &name : pair.at(1)) {

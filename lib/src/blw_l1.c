@@ -81,17 +81,17 @@ bool blw_l1_in_support(const blw_l1_t *self, size_t g)
     return found;
 }
 
-size_t blw_l1_worst(const blw_l1_t *self)
+size_t blw_l1_worst(const blw_l1_t *self, blw_real_t widen)
 {
     const blw_l1_model_t *const m     = self->model;
     const blw_real_t            z     = blw_la_norm(m->d, self->z);
-    const blw_real_t            tau   = BLW_L1_SLACK_TAU * blw_la_norm(m->N, self->tau);
+    const blw_real_t            tau   = blw_la_norm(m->N, self->tau);
     blw_real_t                  worst = BLW_R(1.0);
     size_t                      found = m->n_groups;
 
     for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t limit = m->c[g] + (BLW_L1_SLACK * (m->c[g] + z)) + tau;
-        const blw_real_t ratio = blw_l1_norm(m, g, self->l) / limit;
+        const blw_real_t slack = (BLW_L1_SLACK_Z * (m->c[g] + z)) + (BLW_L1_SLACK_TAU * tau);
+        const blw_real_t ratio = blw_l1_norm(m, g, self->l) / (m->c[g] + (widen * slack));
         if ((ratio > worst) && !blw_l1_in_support(self, g)) {
             worst = ratio;
             found = g;

@@ -8,7 +8,7 @@
 /* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end; and
  * low enough for either if full passes do not lower it any more, because tau is rounded. */
 #define RESIDUAL_ENTER   BLW_R(1e-4)
-#define RESIDUAL_FINAL   (BLW_R(4.0) * BLW_L1_SLACK)
+#define RESIDUAL_FINAL   (BLW_R(256.0) * BLW_REAL_EPS)
 #define RESIDUAL_STALLED (BLW_R(8192.0) * BLW_REAL_EPS)
 
 /* Search along a step, pairs only: most halvings, the share of the first slope that counts as its
@@ -209,7 +209,7 @@ static pass_t descend(blw_l1_t *self, const blw_real_t *zeta)
 
 /* (4) with z and l formed anew from tau, after one last correction.  What the next one would change
  * in x_hat becomes the error bound. */
-static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *bound)
+static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t widen, blw_real_t *bound)
 {
     blw_l1_project(self->model, self->tau, self->z);
     blw_l1_multipliers(self);
@@ -218,7 +218,7 @@ static bool verify(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *bound)
     blw_l1_support_newton(self);
     *bound = blw_l1_support_effect(self);
     return (pass.blocked == self->n_A) && (blw_l1_support_residual(self) <= RESIDUAL_STALLED)
-           && (blw_l1_worst(self) == self->model->n_groups);
+           && (blw_l1_worst(self, widen) == self->model->n_groups);
 }
 
 /* Whether the residual is below a limit, or stalled: no longer halved by a full pass on the same
@@ -238,11 +238,13 @@ void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *in
     blw_l1_multipliers(self);
     while (!info->converged && (info->iterations < self->model->max_iterations)) {
         const blw_real_t residual = blw_l1_support_residual(self);
-        const size_t     worst    = blw_l1_worst(self);
+        const bool       late     = info->iterations > (self->model->max_iterations / 2U);
+        const blw_real_t widen    = late ? BLW_L1_LOOSE : BLW_R(1.0);
+        const size_t     worst    = blw_l1_worst(self, widen);
         const size_t     n_A      = self->n_A;
         info->iterations++;
         if ((worst == none) && low(residual, before, RESIDUAL_FINAL)) {
-            info->converged = verify(self, zeta, &info->bound);
+            info->converged = verify(self, zeta, widen, &info->bound);
             before          = BLW_REAL_MAX;
             continue;
         }

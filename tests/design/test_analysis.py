@@ -3,10 +3,10 @@
 
 import itertools
 
+import golden
 import numpy as np
 import pytest
 
-import golden
 from blw import canonical, kalman, model, modes
 from blw.analysis import advice, security
 from blw.analysis.l1_ratio import RatioProblem
@@ -207,7 +207,8 @@ def test_canonical_ratios_are_the_worst_over_all_sets():
             worst = 0.0
             for chosen in itertools.combinations(range(m), p):
                 inside = np.isin(np.arange(m), chosen)
-                above, below = weights[inside] @ observed[inside], weights[~inside] @ observed[~inside]
+                above = weights[inside] @ observed[inside]
+                below = weights[~inside] @ observed[~inside]
                 with np.errstate(divide="ignore", invalid="ignore"):
                     ratio = np.where(above > 0, above / below, 0.0).max()
                 worst = max(worst, ratio if i in chosen else 0.0)

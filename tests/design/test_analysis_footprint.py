@@ -4,9 +4,9 @@
 import shutil
 import subprocess
 
+import golden
 import pytest
 
-import golden
 from blw import model
 from blw.analysis import footprint, headers
 from blw.design import design_all, plant_tables
@@ -23,11 +23,10 @@ def compiled(folder, text, *options):
         pytest.skip(f"no {COMPILER}")
     source = folder / "sizes.c"
     source.write_text(text)
-    done = subprocess.run(
+    return subprocess.run(
         [COMPILER, "-std=c11", "-mcpu=cortex-m4", "-mthumb", "-ffreestanding", "-I",
          str(headers.HEADERS.parent), "-c", str(source), "-o", str(folder / "sizes.o"), *options],
         capture_output=True, text=True)
-    return done
 
 
 def test_structure_sizes_are_those_of_the_compiler(tmp_path):

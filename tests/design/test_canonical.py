@@ -4,10 +4,10 @@
 import itertools
 import re
 
+import golden
 import numpy as np
 import pytest
 
-import golden
 from blw import canonical, kalman, model, modes, options
 from blw.errors import DesignError, ModelError
 from blw.local_filters import local_filters

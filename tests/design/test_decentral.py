@@ -366,6 +366,12 @@ def test_design_given_a_mode_without_noise_refuses():
         decentral.design(plant, filtered, Options())
 
 
+def test_design_given_no_redundancy_refuses():
+    plant, filtered = parse({"A": [[0.9]], "C": [[1.0]], "Q": [1.0], "R": [1.0]}, p=0)
+    with pytest.raises(DesignError, match="1 local states for 1 states: no redundancy"):
+        decentral.design(plant, filtered, Options())
+
+
 def test_design_given_recursive_gains_and_reseed_refuses():
     with pytest.raises(DesignError, match="reseed needs"):
         decentral.design(*shipped("drone5"), Options(gains="recursive", reseed=True))

@@ -125,6 +125,20 @@ static inline void decentral_point(decentral_made_t *made)
                                                   .E   = made->E,
                                                   .L0  = decentral_one,
                                                   .Psi = decentral_third};
+    made->model     = (blw_decentral_model_t){
+            .head    = {.abi    = BLW_MODEL_ABI,
+                        .method = (uint8_t)BLW_METHOD_DECENTRAL,
+                        .plant  = &made->plant},
+            .mu      = 3U,
+            .rows    = 2U,
+            .readmit = DECENTRAL_READMIT,
+            .max_gap = 2U,
+            .first   = made->first,
+            .Phi     = decentral_one,
+            .scale   = made->scale,
+            .sets    = &made->sets,
+            .ranking = &made->ranking,
+    };
 }
 
 /** Write the model of this file's head, sealed, with steady or recursive gains. */
@@ -155,22 +169,8 @@ static inline void decentral_make(decentral_made_t *made, bool recursive)
         .E         = {BLW_R(1.0), BLW_R(0.0), BLW_R(1.0), BLW_R(0.0), BLW_R(0.0), BLW_R(1.0)},
     };
     decentral_point(made);
-    made->model = (blw_decentral_model_t){
-        .head      = {.abi    = BLW_MODEL_ABI,
-                      .method = (uint8_t)BLW_METHOD_DECENTRAL,
-                      .plant  = &made->plant},
-        .mu        = 3U,
-        .rows      = 2U,
-        .readmit   = DECENTRAL_READMIT,
-        .max_gap   = 2U,
-        .first     = made->first,
-        .Phi       = decentral_one,
-        .scale     = made->scale,
-        .sets      = &made->sets,
-        .ranking   = &made->ranking,
-        .steady    = recursive ? NULL : &made->steady,
-        .recursive = recursive ? &made->recursive : NULL,
-    };
+    made->model.steady    = recursive ? NULL : &made->steady;
+    made->model.recursive = recursive ? &made->recursive : NULL;
     decentral_seal(made);
 }
 

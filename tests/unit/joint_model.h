@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file joint_model.h  The two models of the tests of blw_joint, on the plant of support.h.
  *
- *  With the schedule, pairs (0; 2) and (1; 2), all numbers are computed by hand.  With the recursion,
- *  pairs (0; 1, 2) and (1; 0, 2), sensor 2 strong,
+ *  With the schedule, pairs (0; 2) and (1; 2), all numbers are computed by hand.  With the
+ *  recursion, pairs (0; 1, 2) and (1; 0, 2), sensor 2 strong,
  *      B Q B' = 1/4,  R = [.04 0 .02; 0 .09 0; .02 0 .16],  P0 = .64,  eta = (1, 4),
  *  the expected numbers are NumPy's, from the joint covariance of all errors and noises.
  */

@@ -138,6 +138,28 @@ static void test_step_given_reseed_restarts_a_filter_that_agrees_again(void)
     TEST_ASSERT_EQUAL_HEX64(0U, out.excluded);
 }
 
+static void test_step_given_reseed_and_a_last_sensor_restarts_its_filter(void)
+{
+    made.model.reseed = 1U;
+    start();
+    step_nu(BLW_R(0.0), BLW_R(2.0), BLW_R(1e6), 7U); /* delta 0 1 5e5: x_J = 1/2, g_J = 1/2 */
+    TEST_ASSERT_EQUAL_HEX64(4U, out.excluded);
+    quiet_steps(5U);
+    TEST_ASSERT_EQUAL_HEX64(4U, out.excluded);
+    TEST_ASSERT_TRUE(out.statistic <= BLW_R(0.5));
+}
+
+static void test_step_given_reseed_leaves_a_filter_that_passes_alone(void)
+{
+    made.model.reseed  = 1U;
+    made.model.readmit = 20U;
+    start();
+    step_nu(BLW_R(100.0), BLW_R(0.0), BLW_R(0.0), 7U); /* delta_0 = 50, 12.5, 3.125, ... */
+    quiet_steps(7U);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 50.0 / 16384.0, filter.delta[0] - filter.delta[1]);
+}
+
 static void test_step_given_every_set_fails_reports_the_best_and_says_so(void)
 {
     step_nu(BLW_R(0.0), BLW_R(20.0), BLW_R(100.0), 7U); /* {0, 1}: g = 50 > 4 */
@@ -194,6 +216,18 @@ static void test_score_given_values_far_out_keeps_their_order(void)
                      < blw_decentral_score(&made.model, 2U, BLW_R(5001.0)));
 }
 
+static void test_cover_given_silent_sensors_takes_the_set_with_the_fewest_others(void)
+{
+    const uint16_t             parent[4] = {0U, 0U, 1U, 0U};
+    const uint16_t             sensor[4] = {0U, 0U, 1U, 1U}; /* {0}, {0, 1}, {1} */
+    const blw_decentral_sets_t sets      = {.n_sets = 4U, .parent = parent, .sensor = sensor};
+
+    TEST_ASSERT_EQUAL_size_t(1U, blw_decentral_cover(&sets, 1U));
+    TEST_ASSERT_EQUAL_size_t(3U, blw_decentral_cover(&sets, 2U));
+    TEST_ASSERT_EQUAL_size_t(2U, blw_decentral_cover(&sets, 3U));
+    TEST_ASSERT_EQUAL_size_t(0U, blw_decentral_cover(&sets, 4U));
+}
+
 static void test_statistic_given_a_set_of_two_leaves_nothing_to_test(void)
 {
     filter.delta[0] = BLW_R(7.0);
@@ -225,6 +259,10 @@ static void test_step_given_recursive_gains_and_an_attack_leaves_it_out(void)
     TEST_ASSERT_EQUAL_HEX64(2U, out.excluded);
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.4, out.x_hat[0]); /* mean of 1/5 and 3/5 */
     TEST_ASSERT_EQUAL_UINT(3U, out.iterations);
+    step_nu(BLW_R(0.0), BLW_R(100.0), BLW_R(0.0), 7U);
+    TEST_ASSERT_EQUAL_HEX64(2U, out.excluded);
+    TEST_ASSERT_TRUE(out.statistic > DECENTRAL_THR);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_CONVERGED, out.outcome);
 }
 
 static void test_step_given_recursive_gains_that_cannot_be_inverted_fuses_by_the_steady_ones(void)
@@ -264,10 +302,13 @@ int main(void)
     RUN_TEST(test_step_given_readmit_0_never_returns);
     RUN_TEST(test_step_given_attack_moves_to_another_sensor_follows_it);
     RUN_TEST(test_step_given_reseed_restarts_a_filter_that_agrees_again);
+    RUN_TEST(test_step_given_reseed_and_a_last_sensor_restarts_its_filter);
+    RUN_TEST(test_step_given_reseed_leaves_a_filter_that_passes_alone);
     RUN_TEST(test_step_given_every_set_fails_reports_the_best_and_says_so);
     RUN_TEST(test_step_given_no_candidates_keeps_all_sensors_and_says_so);
     RUN_TEST(test_search_given_degrees_of_freedom_compares_g_plus_c);
     RUN_TEST(test_score_given_values_far_out_keeps_their_order);
+    RUN_TEST(test_cover_given_silent_sensors_takes_the_set_with_the_fewest_others);
     RUN_TEST(test_statistic_given_a_set_of_two_leaves_nothing_to_test);
     RUN_TEST(test_step_given_recursive_gains_yields_hand_computed_estimate);
     RUN_TEST(test_step_given_recursive_gains_and_an_attack_leaves_it_out);

@@ -249,6 +249,23 @@ static void test_step_given_a_silent_sensor_keeps_it_out_in_a_search(void)
     TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
 }
 
+static void test_step_given_silence_and_no_set_that_holds_it_searches_every_step(void)
+{
+    const blw_real_t attacked[3] = {BLW_R(101.0), BLW_R(2.0), BLW_R(3.0)};
+
+    made.plant.p           = 2U;
+    made.sets.n_candidates = 1U;
+    made.candidate[0]      = 4U; /* {0, 1} alone */
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_decentral_init(&filter, &made.model, mem, MEM));
+    step(attacked, 7U);
+    TEST_ASSERT_EQUAL_HEX64(3U, out.excluded);
+    for (size_t k = 0U; k < 3U; k++) {
+        step(attacked, 3U);
+    }
+    TEST_ASSERT_EQUAL_HEX64(3U, out.excluded);
+    TEST_ASSERT_EQUAL_HEX8(BLW_FLAG_MISSING | BLW_FLAG_DEGRADED | BLW_FLAG_BLIND, out.flags);
+}
+
 static void test_step_given_silence_elsewhere_replaces_an_excluded_sensor_that_is_calm(void)
 {
     const blw_real_t attacked[3] = {BLW_R(101.0), BLW_R(2.0), BLW_R(3.0)};
@@ -311,6 +328,28 @@ static void test_step_given_a_prediction_out_of_bounds_starts_again(void)
     }
 }
 
+static void test_step_given_a_fusion_out_of_bounds_predicts(void)
+{
+    const blw_real_t tenth     = BLW_SIGNAL_MAX / BLW_R(10.0);
+    const blw_real_t A[1]      = {BLW_R(1.0)};
+    const blw_real_t x0[1]     = {BLW_SIGNAL_MAX};
+    const blw_real_t offset[3] = {-tenth, -tenth, -tenth};
+    const blw_real_t y[3]      = {BLW_SIGNAL_MAX, BLW_SIGNAL_MAX, BLW_SIGNAL_MAX};
+
+    made.plant.A      = A;
+    made.plant.offset = offset;
+    for (size_t i = 0U; i < 3U; i++) {
+        made.scale[i] = BLW_R(1.0) / BLW_SIGNAL_MAX;
+    }
+    decentral_seal(&made);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_decentral_init(&filter, &made.model, mem, MEM));
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_decentral_reset(&filter, x0));
+    step(y, 7U);
+    TEST_ASSERT_REAL_WITHIN(0.0, x0[0], out.x_hat[0]);
+    TEST_ASSERT_EQUAL_HEX64(0U, out.used);
+    TEST_ASSERT_REAL_WITHIN(0.0, 0.0, filter.delta[1]);
+}
+
 static void test_ops_given_the_interface_reach_the_same_functions(void)
 {
     const blw_estimator_ops_t *const ops   = &blw_decentral_ops;
@@ -345,10 +384,12 @@ int main(void)
     RUN_TEST(test_step_given_a_long_gap_leaves_the_sensor_out_until_it_passes);
     RUN_TEST(test_step_given_two_silent_sensors_leaves_both_out);
     RUN_TEST(test_step_given_a_silent_sensor_keeps_it_out_in_a_search);
+    RUN_TEST(test_step_given_silence_and_no_set_that_holds_it_searches_every_step);
     RUN_TEST(test_step_given_silence_elsewhere_replaces_an_excluded_sensor_that_is_calm);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);
     RUN_TEST(test_step_given_attacks_of_any_size_leaves_no_trace_in_the_estimate);
     RUN_TEST(test_step_given_a_prediction_out_of_bounds_starts_again);
+    RUN_TEST(test_step_given_a_fusion_out_of_bounds_predicts);
     RUN_TEST(test_ops_given_the_interface_reach_the_same_functions);
     return UNITY_END();
 }

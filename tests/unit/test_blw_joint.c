@@ -111,8 +111,8 @@ static void test_step_given_the_recursion_yields_the_estimates_of_numpy(void)
     assert_estimates(TOL_RECURSIVE, expected[4]);
 }
 
-/* Moving x_hat by -1 and all remainders by +1 leaves the local estimates where they are, so that the
- * fused one must stay, too, if the weights sum to 1. */
+/* Moving x_hat by -1 and all remainders by +1 leaves the local estimates where they are, so that
+ * the fused one must stay, too, if the weights sum to 1. */
 static void test_step_given_any_mask_uses_weights_that_sum_to_one(void)
 {
     static blw_real_t saved[MEM];

@@ -142,8 +142,8 @@ def sensor_weights(model: Model, options: Options) -> Array:
 
 def default_weights(model: Model) -> Array:
     """[m] 1, 1.03, 1.07, 1.13, ...: no equal partial sums, and a range below (p + 1) / p."""
-    later = WIDEST * np.modf(GOLDEN_SECTION * np.arange(len(OFFSETS), max(model.m, len(OFFSETS))))[0]
-    offsets = np.concatenate([OFFSETS, later])[: model.m]
+    later = np.arange(len(OFFSETS), max(model.m, len(OFFSETS)))
+    offsets = np.concatenate([OFFSETS, WIDEST * np.modf(GOLDEN_SECTION * later)[0]])[: model.m]
     return 1.0 + offsets * min(1.0, 3.0 / max(model.p, 1))
 
 

@@ -104,10 +104,10 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "recursive": None if steady else engine,
     }, method=NAME)
     mem = (model.n, model.m, mu, most_rows, 0 if steady else 1)
-    footprint = _footprint(model, filters, tables, mem, options)
+    footprint = _footprint(model, filters, tables, mem)
     _check_limits(footprint, options)
-    info = _info(model, filters, tree, ranking, options) | {"footprint": footprint}
-    info["warm_up"] = tables.members["warm_up"]
+    info = _info(model, filters, tree, ranking, options)
+    info |= {"warm_up": tables.members["warm_up"], "footprint": footprint}
     return Designed(tables, info, mem=mem)
 
 
@@ -229,8 +229,8 @@ def _root(W: np.ndarray) -> np.ndarray:
     return vectors * np.sqrt(np.clip(values, 0.0, None))
 
 
-def _footprint(model: Model, filters: LocalFilters, tables: Struct, mem: tuple[int, ...],
-               options: Options) -> dict[str, int]:
+def _footprint(model: Model, filters: LocalFilters, tables: Struct,
+               mem: tuple[int, ...]) -> dict[str, int]:
     """Bytes for float32 tables and memory, and multiply-adds of a step."""
     n, m, mu, rows, recursive = mem
     local = int(np.sum(filters.mu**2)) + mu + m * n + n * (n + model.l)

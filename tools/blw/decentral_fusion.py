@@ -67,9 +67,11 @@ class Node:
 
 
 def fuse(filters: LocalFilters) -> Fusion:
-    """(1) and the factors of N_i.  Raises DesignError if P is not positive definite."""
+    """(1) and the factors of N_i.  Raises DesignError if P is not positive definite or mu = n."""
+    mu, n = filters.Phi.shape
+    if mu <= n:
+        raise DesignError(f"{mu} local states for {n} states: no redundancy to test")
     L = cholesky(filters)
-    n = filters.Phi.shape[1]
     whitened = solve_triangular(L, filters.Phi, lower=True)
     Q, R = np.linalg.qr(whitened, mode="complete")
     left = solve_triangular(L.T, Q).T

@@ -10,7 +10,7 @@
  *  nu_i = 0: its filter coasts on the prediction.  With w = N delta, white without attack,
  *      g = |w|^2 ~ chi2(mu - n)                                                               (3)
  *  is held against its threshold.  If it fails, the sensors e whose removal leaves the most
- *  plausible g_J (the largest survival probability, J = all others) are left out: with q_i = Q_i' w,
+ *  plausible g_J (largest survival probability, J = all others) are left out: with q_i = Q_i' w,
  *      g_J = |w|^2 - |t|^2,   x_J = x_bar + Psi delta - sum_i Y_i s_i                         (4)
  *  where t and s follow from the q_i of e (tools/blw/decentral_fusion.py).  Neither depends on
  *  delta_e, which is set to 0 for (4): an attack of any size leaves no rounding error behind.

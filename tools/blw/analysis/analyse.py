@@ -33,38 +33,58 @@ def analyse(model: Model, methods: Sequence[str] | None, progress: Progress) -> 
         modes = modes_of(model.A, model.C)
     except DesignError as error:
         raise DesignError(f"{where}: {error}") from None
-    single = [[i] for i in range(model.m)]
-    index = sparse_index(modes.modes, single, progress=progress)
     over_units = sparse_index(modes.modes, model.units, progress=progress)
-    lasting = [mode for mode in modes.modes if mode.persists]
-    detectable = sparse_index(lasting, model.units, progress=progress)
-    designed = design_all(model, methods, progress)
-    case = security.Case(model, kalman, modes, over_units, progress)
-    verdicts = security.verdicts(case, methods or REGISTRY)
+    figures = _designs(model, list(methods or REGISTRY), progress)
+    refused = {name: entry["refused"] for name, entry in figures.items() if "refused" in entry}
+    case = security.Case(model, kalman, modes, over_units, progress, refused)
+    verdicts = security.verdicts(case, figures)
     result = {
         "name": model.name, "n": model.n, "m": model.m, "p": model.p,
         "sensors": model.sensors, "groups": model.groups,
         "modes": [_mode(mode, model) for mode in modes.modes],
         "derogatory": bool(modes.derogatory),
+        **_indices(model, modes, over_units, progress),
+        "cond_P": float(np.linalg.cond(kalman.P)),
+        "methods": {
+            name: (verdicts[name].to_json(model.m) if name in verdicts else {}) | entry
+            for name, entry in figures.items()
+        },
+        "advice": _advice(model, modes, over_units, progress),
+    }
+    result["verdict"] = verdict_text(result)
+    return result
+
+
+def _indices(model: Model, modes: Modes, over_units: Index, progress: Progress) -> dict[str, Any]:
+    """The sparse-observability index over sensors and groups, and for the modes that last."""
+    index = sparse_index(modes.modes, [[i] for i in range(model.m)], progress=progress)
+    lasting = [mode for mode in modes.modes if mode.persists]
+    detectable = sparse_index(lasting, model.units, progress=progress)
+    return {
         "sparse_observability_index": index.lower,
         "index_is_exact": index.exact,
+        "index_upper_bound": index.upper,
         "index_over_groups": over_units.lower,
-        "index_upper_bound": over_units.upper,
         "sparse_detectability_index": detectable.lower,
         "max_attacked": over_units.max_attacked,
         "weakest_mode": None if over_units.weakest is None else _complex(over_units.weakest),
-        "cond_P": float(np.linalg.cond(kalman.P)),
-        "methods": {name: verdict.to_json(model.m) for name, verdict in verdicts.items()},
     }
-    for name, one in designed.methods.items():
-        entry = result["methods"].setdefault(name, {})
-        entry["tuning"] = tuning(one.info)
-        entry["footprint"] = asdict(footprint(name, one, designed.plant))
-    for name, reason in designed.refused.items():
-        result["methods"].setdefault(name, {})["refused"] = reason
-    result["advice"] = _advice(model, modes, over_units, progress)
-    result["verdict"] = verdict_text(result)
-    return result
+
+
+def _designs(model: Model, methods: Sequence[str], progress: Progress) -> dict[str, dict[str, Any]]:
+    """Footprint and tuning of every method, or why it refuses the model."""
+    found: dict[str, dict[str, Any]] = {}
+    for name in dict.fromkeys(methods):
+        try:
+            whole = design_all(model, [name], progress)
+        except DesignError as error:
+            reason = str(error).removeprefix(f"{model.path or model.name}: {name}: ")
+            found[name] = {"refused": reason}
+            continue
+        designed = whole.methods[name]
+        found[name] = {"tuning": tuning(designed.info),
+                       "footprint": asdict(footprint(name, designed, whole.plant))}
+    return found
 
 
 def _mode(mode: Mode, model: Model) -> dict[str, Any]:
@@ -106,8 +126,8 @@ def verdict_text(result: dict[str, Any]) -> str:
     text = f"Against {many}, safe: {', '.join(safe) or 'none'}; not safe: " \
            f"{', '.join(unsafe) or 'none'}."
     if result["max_attacked"] < p:
-        text += (f"  The sensors cannot bear it: at most {result['max_attacked']} lying,"
-                 " whatever the method.")
+        text += ("  Unless some are trusted, the sensors determine the state with at most"
+                 f" {result['max_attacked']} of them lying.")
         helps = [change["text"] for change in result["advice"]]
         text += "  To change that: " + "; or ".join(helps) + "." if helps else ""
     return text

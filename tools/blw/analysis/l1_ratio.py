@@ -154,7 +154,7 @@ class RatioProblem:
         return Ratio(lower, max(lower, upper))
 
     def _ascend(self, v: Array) -> float:
-        """A local maximum of (1): the numerator is replaced by its tangent until it stands still."""
+        """A local maximum of (1): the numerator gives way to its tangent until it stands still."""
         best = self.value(v) if v.any() else 0.0
         for _ in range(ASCENTS):
             slope = np.zeros(v.size)

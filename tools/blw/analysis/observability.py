@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Sparse observability: how many sensors can be lost before some mode is seen by none.
 
-A set S of sensors sees a mode with eigenspace V iff rank C_S V = dim V.  The attacker blinds it with
-the fewest removals by leaving the most sensors inside one hyperplane, so
+A set S of sensors sees a mode with eigenspace V iff rank C_S V = dim V.  The attacker blinds it
+with the fewest removals by leaving the most sensors inside one hyperplane, so
 
-    index + 1 = min over the modes of (sensors - largest set S with rank C_S V < dim V).          (1)
+    index + 1 = min over the modes of (sensors - largest set S with rank C_S V < dim V).         (1)
 
-For dim V = 1, which is every mode of a non-derogatory A, S holds the sensors that do not see it and
-(1) is a count ([N] Corollary 2).  Otherwise the flats of the rows of C V are searched: branch on one
-sensor, inside or outside, and bound by what is undecided.  Sensors that fall together count as one
-unit; protected ones are never lost.
+For dim V = 1, which is every mode of a non-derogatory A, S holds the sensors that do not see it,
+and (1) is a count ([N] Corollary 2).  Otherwise the flats of the rows of C V are searched: branch
+on one sensor, inside or outside, and bound by what is undecided.  Sensors that fall together count
+as one unit; protected ones are never lost.
 """
 
 from collections.abc import Callable, Iterable, Sequence

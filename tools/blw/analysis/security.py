@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """What every method promises for one model and p attacked units (a sensor, or a group of them).
 
-`ratio` is [L] Theorem 4 / [N] Theorem 1 where a method has such a condition: a sensor's entry is the
-largest ratio over the sets of p units that contain it.
+`ratio` is [L] Theorem 4 / [N] Theorem 1 where a method has such a condition: a sensor's entry is
+the largest ratio over the sets of p units that contain it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, islice
 from math import comb
@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from blw import canonical, l1, options
 from blw.analysis.l1_ratio import UNBOUNDED, ZERO, Ratio, RatioProblem
 from blw.analysis.observability import Index, sparse_index
-from blw.errors import DesignError
 from blw.kalman import Kalman, mode_text
 from blw.local_filters import local_filters
 from blw.model import Model
@@ -57,6 +56,7 @@ class Case:
     modes: Modes
     index: Index  #: over units
     progress: Progress = lambda text: None
+    refused: Mapping[str, str] = field(default_factory=dict)  #: method -> why it has no design
 
     @property
     def p(self) -> int:
@@ -69,10 +69,13 @@ class Case:
 
 
 def verdicts(case: Case, names: Iterable[str]) -> dict[str, Verdict]:
-    """Verdict of every named method that this module knows."""
+    """Verdict of every named method that this module knows.  Raises DesignError if a method has no
+    design and `case` does not say so."""
     known = {"kalman": _kalman, "lasso": _lasso, "canonical": _canonical, "joint": _joint,
              "decentral": _by_search, "bank": _by_search, "guard": _guard}
-    return {name: known[name](case) for name in names if name in known}
+    return {name: known[name](case) if name not in case.refused
+            else Verdict(False, f"refused: {case.refused[name]}")
+            for name in names if name in known}
 
 
 def _kalman(case: Case) -> Verdict:
@@ -84,10 +87,7 @@ def _kalman(case: Case) -> Verdict:
 def _lasso(case: Case) -> Verdict:
     if case.p == 0:
         return Verdict(True, "no sensor is attacked (p = 0)", [ZERO] * case.model.m)
-    try:
-        filters = local_filters(case.model, case.kalman)
-    except DesignError as error:
-        return Verdict(False, f"refused: {error}")
+    filters = local_filters(case.model, case.kalman)
     m, r = case.model.m, filters.r
     groups = l1.sensor_groups(filters.form.groups(), m, r)
     rows = [weight * filters.G[first:last]
@@ -130,10 +130,6 @@ def _canonical(case: Case) -> Verdict:
     given = options.parse(canonical.Options, case.model.methods.get(canonical.NAME, {}),
                           f"{case.model.path or case.model.name}: method.{canonical.NAME}")
     weights = canonical.sensor_weights(case.model, given)
-    try:
-        canonical.transforms(local_filters(case.model, case.kalman), case.modes)
-    except DesignError as error:
-        return Verdict(False, f"refused: {error}")
     return _judged(mode_ratios(case.modes.observed, weights, case.model.units, case.p), case,
                    "[N] Theorem 4")
 
@@ -175,8 +171,8 @@ def _judged(found: list[Ratio], case: Case, theorem: str) -> Verdict:
 
 def _by_search(case: Case) -> Verdict:
     if case.sparse:
-        return Verdict(True, f"{2 * case.p}-sparse observable (index {case.index.lower}): the honest"
-                             " sensors single out one state")
+        return Verdict(True, f"{2 * case.p}-sparse observable (index {case.index.lower}): the"
+                             " honest sensors single out one state")
     return Verdict(False, _too_few(case))
 
 

@@ -46,7 +46,7 @@ def _index(result: dict[str, Any]) -> list[str]:
         line += f", {result['index_over_groups']} over groups"
     lasting = result["sparse_detectability_index"]
     lines = [line + f"; {lasting} for the modes that do not die out"]
-    return lines + [f"Lying at once that any estimator can bear: {result['max_attacked']}"]
+    return lines + [f"The state is determined with up to {result['max_attacked']} lying at once"]
 
 
 def _methods(result: dict[str, Any]) -> list[str]:
@@ -75,7 +75,7 @@ def _ratios(sensors: list[str], entry: dict[str, Any]) -> list[str]:
 
 
 def _costs(result: dict[str, Any]) -> list[str]:
-    lines = [f"{'Footprint':<11} {'flash B':>9} {'RAM B':>8}   multiply-adds a step: usual, at most"]
+    lines = [f"{'Footprint':<11} {'flash B':>9} {'RAM B':>8}   multiply-adds: usual, at most"]
     for name, entry in result["methods"].items():
         if "footprint" in entry:
             cost = entry["footprint"]
