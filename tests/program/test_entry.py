@@ -99,7 +99,8 @@ def test_entry_given_command_and_help_explains_it(entry, command):
     (("report", "no"), "no"),
     (("test", "unti"), "no test has the label 'unti'"),
 ])
-def test_entry_given_wrong_usage_refuses_with_one_line(entry, refused, tmp_path, arguments, message):
+def test_entry_given_wrong_usage_refuses_with_one_line(
+        entry, refused, tmp_path, arguments, message):
     assert message in refused(entry(*arguments, cwd=tmp_path))
     assert list(tmp_path.iterdir()) == []
 

@@ -2,6 +2,7 @@
 """Checks of the sources themselves: format, static analysis, shell scripts."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -9,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import click
 
-from blw.build import ROOT, configure
+from blw.build import BUILD, ROOT, configure
 from blw.tally import Tally
 
 LLVM = "14"  # Debian 12's; another version formats differently
@@ -33,7 +34,8 @@ def run() -> Tally:
         "shellcheck": [["shellcheck", "--external-sources", *SHELL]],
         "ruff": [[sys.executable, "-m", "ruff", "check", "--quiet", "tools", "tests"]],
     }
-    return sum((_check(name, each) for name, each in commands.items()), Tally())
+    checked = sum((_check(name, each) for name, each in commands.items()), Tally())
+    return checked + _misra(library)
 
 
 def _sources(folder: str, *suffixes: str) -> list[str]:
@@ -51,6 +53,23 @@ def _check(name: str, commands: Sequence[Sequence[str]]) -> Tally:
     if failed:
         click.echo(f"bulwark: {name} found something", err=True)
     return Tally.of(not failed)
+
+
+def _misra(library: Sequence[str]) -> Tally:
+    """Hold the ledger of deviations in README.md against what cppcheck finds in the library."""
+    scratch = BUILD / "cppcheck"  # else its files land beside the sources
+    scratch.mkdir(exist_ok=True)
+    found = _call(["cppcheck", "--quiet", "--std=c99", "--addon=misra", "-Ilib/include",
+                   "-Ilib/src", f"--cppcheck-build-dir={scratch}", *library]).stdout
+    broken = set(re.findall(r"misra-c2012-([\d.]+)", found))
+    rows = re.findall(r"^\| D-\d+ \| ([\d., ]+) \|", (ROOT / "README.md").read_text("utf-8"), re.M)
+    listed = {rule for row in rows for rule in row.split(", ")}
+    for rule in sorted(broken - listed):
+        places = "\n".join(line for line in found.splitlines() if line.endswith(f"c2012-{rule}]"))
+        click.echo(f"{places}\nbulwark: MISRA rule {rule} is broken and not in README.md", err=True)
+    for rule in sorted(listed - broken):
+        click.echo(f"bulwark: MISRA rule {rule} is in README.md but not broken", err=True)
+    return Tally.of(broken == listed)
 
 
 def _call(command: Sequence[str]) -> subprocess.CompletedProcess:
