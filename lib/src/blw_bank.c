@@ -191,11 +191,12 @@ static void move_reference(blw_bank_t *self)
     }
 }
 
-/* A sensor is as suspicious as the best set that holds it.  @return the sensors that are missing
- * from every passing set */
-static blw_mask_t suspect(blw_bank_t *self, blw_mask_t used)
+/* A sensor is as suspicious as the best set that holds it.  @return the sensors that no passing set
+ * holds, or if none passes those that the choice leaves out */
+static blw_mask_t suspect(blw_bank_t *self, blw_mask_t used, bool passed)
 {
-    blw_mask_t accused = 0U;
+    const uint16_t chosen   = self->model->set_mask[self->choice];
+    blw_mask_t     excluded = 0U;
 
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
         blw_real_t best = BLW_REAL_MAX;
@@ -207,11 +208,11 @@ static blw_mask_t suspect(blw_bank_t *self, blw_mask_t used)
         }
         const bool missing = ((used >> i) & 1U) == 0U;
         self->suspicion[i] = missing ? BLW_R(1.0) : blw_step_suspicion(best);
-        if (best > BLW_R(1.0)) {
-            accused |= (blw_mask_t)1U << i;
+        if (passed ? (best > BLW_R(1.0)) : !blw_bank_has(chosen, i)) {
+            excluded |= (blw_mask_t)1U << i;
         }
     }
-    return accused;
+    return excluded;
 }
 
 static uint8_t flags_of(const blw_bank_t *self, blw_mask_t used, blw_mask_t excluded)
@@ -229,9 +230,7 @@ static uint8_t flags_of(const blw_bank_t *self, blw_mask_t used, blw_mask_t excl
 
 static void report(blw_bank_t *self, blw_mask_t used, bool passed, blw_estimator_out_t *out)
 {
-    const blw_mask_t all      = BLW_MASK_ALL(self->model->head.plant->m);
-    const blw_mask_t accused  = suspect(self, used);
-    const blw_mask_t excluded = passed ? accused : (all & ~self->model->set_mask[self->choice]);
+    const blw_mask_t excluded = suspect(self, used, passed);
     blw_real_t       largest  = BLW_R(0.0);
 
     for (size_t s = 0U; s < self->model->sets; s++) {

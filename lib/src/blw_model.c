@@ -22,7 +22,7 @@ static uint32_t crc_real(uint32_t crc, blw_real_t value)
 {
     real_bits_t bits;
 
-    memcpy(&bits, &value, sizeof bits);
+    (void)memcpy(&bits, &value, sizeof bits);
     crc = ~crc;
     for (size_t nibble = 0U; nibble < (2U * sizeof bits); nibble++) {
         crc = (crc >> 4) ^ crc_nibble[(crc ^ (uint32_t)bits) & 0xFU];

@@ -168,7 +168,7 @@ def footprint(model: Model, bank: Bank) -> dict[str, int]:
         "index_numbers": len(sizes) + len(thetas) + tests,
         "memory_numbers": memory_numbers(n, m, len(sizes), len(thetas), tests * bank.groups, h),
         "multiply_adds": (n * (n + l + m) + sum(n * n + 2 * (n + 1) * size for size in sizes)
-                          + (h - 1) * n * n + h * m * n + n * h * sum(thetas) + tests * (n + 2)),
+                          + h * n * (n + m) + n * h * sum(thetas) + tests * (n + 2)),
     }
 
 

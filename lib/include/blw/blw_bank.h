@@ -48,7 +48,7 @@ typedef struct blw_bank_model {
     const uint16_t   *subset_mask; /**< [subsets] sensors of a subset */
     const uint16_t   *pair;        /**< [sets x per_set] the subsets of every set */
     blw_real_t        gain;        /**< weight of one block in the average, (0, 1] */
-    blw_real_t        ceiling;   /**< no average rises above it, > 1 */
+    blw_real_t        ceiling;     /**< no average rises above it, > 1 */
     const blw_real_t *K;           /**< [sets][n x size of the set] gains */
     const blw_real_t *Z;           /**< [subsets][n x h size of the subset] left inverses */
     const blw_real_t *scale;       /**< [sets x per_set] 1 / threshold of the average, > 0 */
@@ -95,8 +95,8 @@ blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model, blw_
 blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0);
 /** As blw_estimator_ops.step.  out->statistic is what speaks most against any set, so it exceeds
  *  out->threshold = 1 as long as a set fails; a sensor's suspicion comes from the best set that
- *  holds it.  Every set leaves p sensors out, but out->excluded holds only those that no passing set
- *  holds, or with BLW_OUTCOME_HELD those that the last choice leaves out.
+ *  holds it.  Every set leaves p sensors out, but out->excluded holds only those that no passing
+ *  set holds, or with BLW_OUTCOME_HELD those that the last choice leaves out.
  *  With s = |set|, theta = |subset|, the same whatever the data:
  *      n (n + l + m) + sum over sets (n n + 2 s (n + 1)) + h n (n + m) + sum over subsets h n theta
  *      + sets per_set (n + 2) multiply-adds. */
