@@ -23,6 +23,7 @@ CEILING = 1.5             # of an average over its threshold: it recovers in a t
 SETTLED = 0.01            # part of P_opt that the initial error may still hold
 UNKNOWN_START = 1e4       # times P: the initial error covariance that is provided for without P0
 MAX_WARM_UP = 60000
+WORTHWHILE = 0.8          # of epsilon: a longer horizon that leaves more is not proposed
 
 Array = NDArray[np.float64]
 
@@ -139,13 +140,15 @@ def _info(model: Model, options: Options, bank: Bank, warm_up: int) -> dict[str,
 
 
 def _advice(model: Model, options: Options, bank: Bank, ratio: float) -> str | None:
-    """What twice the horizon would change, where epsilon is larger than P_opt."""
+    """What twice the horizon would change, where epsilon is larger than P_opt and that helps."""
     longer = 2 * bank.horizon
     if ratio <= 1.0 or longer > MAX_HORIZON or options.grouped:
         return None
     other = build(model, replace(options, horizon=longer))
     p_opt = max(member.p_opt(options.version == "filter") for member in other.members)
     gain = max(test.epsilon for test in other.tests) / p_opt
+    if gain > WORTHWHILE * ratio:
+        return None
     work = footprint(model, other)["multiply_adds"] / footprint(model, bank)["multiply_adds"]
     return (f"epsilon is {ratio:.3g} P_opt; horizon = {longer} makes it {gain:.3g} P_opt for "
             f"{work:.2g} times the work")
