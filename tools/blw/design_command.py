@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from blw import kalman
 from blw.atomic import write_files
 from blw.design import Design, design_all, document, json_text
 from blw.emit_c import files
@@ -19,12 +20,15 @@ from blw.progress import steps
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
               help="Folder for NAME.json, NAME_model.h and NAME_model.c; made if missing.")
 @click.option("--method", "methods", multiple=True, metavar="METHOD",
-              help="Method to design; may be repeated.  Default: all that accept the model.")
+              help="Method to design beside kalman; may be repeated.  Default: all that accept "
+                   "the model.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
 def design(model: Path, out: Path, methods: tuple[str, ...], as_json: bool) -> None:
     """Compute the tables of MODEL (a TOML file) for the library and the simulator."""
     with steps("design") as progress:
-        result = design_all(load(model), methods or None, progress)
+        # the simulator shows every method beside the Kalman filter
+        wanted = list(dict.fromkeys((kalman.NAME, *methods))) if methods else None
+        result = design_all(load(model), wanted, progress)
     if not result.methods:
         reasons = "; ".join(f"{name}: {reason}" for name, reason in result.refused.items())
         raise DesignError(f"{model}: no method accepts this model: {reasons}")
