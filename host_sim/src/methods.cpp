@@ -2,6 +2,7 @@
 #include "methods.h"
 #include "blw/blw_bank.h"
 #include "blw/blw_decentral.h"
+#include "blw/blw_guard.h"
 #include "blw/blw_joint.h"
 #include "blw/blw_kalman.h"
 #include "blw/blw_lasso.h"
@@ -52,6 +53,7 @@ const std::vector<Method> &registry()
         {"decentral", BLW_METHOD_DECENTRAL, &blw_decentral_ops, load_decentral},
         {"bank", BLW_METHOD_BANK, &blw_bank_ops, load_bank},
         {"joint", BLW_METHOD_JOINT, &blw_joint_ops, load_joint},
+        {"guard", BLW_METHOD_GUARD, &blw_guard_ops, load_guard},
     };
     return methods;
 }

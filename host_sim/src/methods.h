@@ -41,6 +41,7 @@ struct Method {
 
 std::unique_ptr<MethodTables> load_bank(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_decentral(TableReader &tables, const blw_plant_t &plant);
+std::unique_ptr<MethodTables> load_guard(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_joint(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_kalman(TableReader &tables, const blw_plant_t &plant);
 std::unique_ptr<MethodTables> load_lasso(TableReader &tables, const blw_plant_t &plant);

@@ -116,7 +116,7 @@ blw_mask_t blw_plant_screen(const blw_plant_t *plant, const blw_real_t *y, blw_m
     for (size_t i = 0U; i < plant->m; i++) {
         const bool in_range = (y[i] >= plant->y_min[i]) && (y[i] <= plant->y_max[i]);
 
-        if (!in_range || !blw_la_bounded(1U, &y[i])) {
+        if (!in_range || !(blw_la_abs(y[i]) <= BLW_SIGNAL_MAX)) {
             used &= ~((blw_mask_t)1U << i);
         }
     }

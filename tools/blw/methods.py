@@ -6,7 +6,7 @@ A module has NAME, a dataclass Options, and design(model, kalman, options) -> De
 
 from types import ModuleType
 
-from blw import bank, canonical, decentral, joint, kalman, lasso
+from blw import bank, canonical, decentral, guard, joint, kalman, lasso
 
 REGISTRY: dict[str, ModuleType] = {module.NAME: module for module in (
     kalman,
@@ -15,4 +15,5 @@ REGISTRY: dict[str, ModuleType] = {module.NAME: module for module in (
     decentral,
     bank,
     joint,
+    guard,
 )}

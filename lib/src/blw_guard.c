@@ -1,0 +1,341 @@
+/* SPDX-License-Identifier: MIT */
+#include "blw/blw_guard.h"
+#include "blw_guard_internal.h"
+#include "blw_guard_strips.h"
+#include "blw_la.h"
+#include "blw_step.h"
+
+static size_t mem_len_of(const blw_guard_model_t *model)
+{
+    const blw_plant_t *const plant = model->head.plant;
+
+    return BLW_GUARD_MEM(plant->n, plant->m, model->r, model->most);
+}
+
+static void bind(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *mem)
+{
+    const size_t n = model->head.plant->n;
+    const size_t m = model->head.plant->m;
+    const size_t N = m * model->r;
+
+    self->base.ops  = &blw_guard_ops;
+    self->model     = model;
+    self->eta       = blw_la_take(&mem, N);
+    self->e         = blw_la_take(&mem, N);
+    self->l         = blw_la_take(&mem, N);
+    self->average   = blw_la_take(&mem, N);
+    self->h         = blw_la_take(&mem, m);
+    self->suspicion = blw_la_take(&mem, m);
+    self->x_bar     = blw_la_take(&mem, n);
+    self->x_ref     = blw_la_take(&mem, n);
+    self->x_hat     = blw_la_take(&mem, n);
+    self->d         = blw_la_take(&mem, n);
+    self->step      = blw_la_take(&mem, (size_t)model->most * model->r);
+    self->L         = mem;
+}
+
+blw_status_t blw_guard_init(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *mem,
+                            size_t mem_len)
+{
+    if ((self == NULL) || (model == NULL) || (mem == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_status_t status = blw_guard_check(model);
+    if (status != BLW_OK) {
+        return status;
+    }
+    if (mem_len < mem_len_of(model)) {
+        return BLW_ERR_MEM;
+    }
+    bind(self, model, mem);
+    return blw_guard_reset(self, NULL);
+}
+
+blw_status_t blw_guard_reset(blw_guard_t *self, const blw_real_t *x0)
+{
+    if (self == NULL) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant = self->model->head.plant;
+    const blw_real_t *const  start = (x0 != NULL) ? x0 : plant->x0;
+    const size_t             N     = (size_t)plant->m * self->model->r;
+    if (!blw_la_bounded(plant->n, start)) {
+        return BLW_ERR_ARG;
+    }
+    blw_la_copy(plant->n, start, self->x_ref);
+    blw_la_copy(plant->n, start, self->x_hat);
+    blw_la_fill(N, BLW_R(0.0), self->eta);
+    blw_la_fill(N, BLW_R(0.0), self->average);
+    self->warm_up = self->model->warm_up;
+    return BLW_OK;
+}
+
+/* Innovation of sensor i about the reference; a missing sample counts as its prediction from the
+ * last estimate, y_bar = C_i A (x_hat - x_ref) above the reference's. */
+static blw_real_t innovation(const blw_guard_t *self, size_t i, const blw_real_t *y, bool used)
+{
+    const blw_plant_t *const plant = self->model->head.plant;
+    const size_t             n     = plant->n;
+    const blw_real_t *const  C     = &plant->C[i * n];
+    blw_real_t               y_bar = BLW_R(0.0);
+
+    if (used) {
+        return (y[i] - plant->offset[i]) - blw_la_dot(n, C, self->x_bar);
+    }
+    if (self->model->n_u == plant->n) { /* x_hat = x_ref */
+        return BLW_R(0.0);
+    }
+    for (size_t j = 0U; j < n; j++) {
+        for (size_t k = 0U; k < n; k++) {
+            y_bar += C[j] * plant->A[(j * n) + k] * (self->x_hat[k] - self->x_ref[k]);
+        }
+    }
+    return y_bar;
+}
+
+/* (1) */
+static void advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   r     = model->r;
+    const size_t                   m     = model->head.plant->m;
+    const blw_real_t              *b     = model->b;
+    blw_mask_t                     rest  = used;
+    size_t                         row   = 0U;
+
+    for (size_t i = 0U; i < m; i++) {
+        const blw_real_t nu = innovation(self, i, y, (rest & 1U) != 0U);
+
+        for (size_t a = 0U; a < r; a++) {
+            self->e[row + a] = b[row + a] * nu;
+        }
+        guard_mul(r, r, 0U, r, &model->Lam[row * r], &self->eta[row], &self->e[row]);
+        rest >>= 1;
+        row += r;
+    }
+}
+
+/* l = S e, |l_i|^2 and the largest of them; a NaN or an infinity in l makes it infinite or NaN. */
+static blw_real_t test(blw_guard_t *self)
+{
+    const size_t      r       = self->model->r;
+    const size_t      m       = self->model->head.plant->m;
+    const blw_real_t *l       = self->l;
+    blw_real_t        largest = BLW_R(0.0);
+    blw_real_t        all     = BLW_R(0.0);
+
+    blw_guard_multipliers(self->model, self->e, self->l);
+    for (size_t i = 0U; i < m; i++) {
+        blw_real_t g = BLW_R(0.0);
+
+        for (size_t a = 0U; a < r; a++) {
+            g += l[a] * l[a];
+        }
+        self->h[i] = g;
+        all += g;
+        largest = blw_la_max(largest, g);
+        l += r;
+    }
+    return (all <= BLW_REAL_MAX) ? largest : all;
+}
+
+/* A local filter that a sample has thrown out of bounds starts again from the reference, and the
+ * sample counts as missing.  @return the samples that were taken in. */
+static blw_mask_t mend(blw_guard_t *self, blw_mask_t used)
+{
+    const size_t r     = self->model->r;
+    blw_mask_t   taken = used;
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        if (!blw_la_bounded(r, &self->e[i * r])) {
+            blw_la_fill(r, BLW_R(0.0), &self->e[i * r]);
+            taken &= ~guard_bit(i);
+        }
+    }
+    return taken;
+}
+
+/* (4) and (5) from tau and l. */
+static void fuse(blw_guard_t *self, const blw_real_t *tau)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   n     = model->head.plant->n;
+    const size_t                   n_u   = model->n_u;
+    const size_t                   N     = (size_t)model->head.plant->m * model->r;
+
+    blw_la_fill(n, BLW_R(0.0), self->d);
+    guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
+    if (n_u == n) {
+        for (size_t j = 0U; j < n; j++) {
+            self->x_ref[j] = self->x_bar[j] + self->d[j];
+            self->x_hat[j] = self->x_ref[j];
+            self->d[j]     = -self->d[j];
+        }
+        guard_mul_t(n_u, N, model->Gu, self->d, self->e, self->eta);
+        return;
+    }
+    blw_la_copy(n, self->x_bar, self->x_ref);
+    blw_la_gemv_add(n, n_u, model->Xu, self->d, self->x_ref);
+    blw_la_copy(N, self->e, self->eta);
+    for (size_t j = 0U; j < n_u; j++) {
+        self->d[j] = -self->d[j];
+    }
+    guard_mul_t(n_u, N, model->Gu, self->d, self->e, self->eta);
+    blw_la_fill(n, BLW_R(0.0), self->d);
+    guard_mul(n - n_u, N, 0U, N, model->Sig, self->l, self->d);
+    blw_la_copy(n, self->x_ref, self->x_hat);
+    blw_la_gemv_add(n, n - n_u, model->Xs, self->d, self->x_hat);
+}
+
+/* Start again from the prediction; only samples at the limit of the numbers lead here. */
+static void restart(blw_guard_t *self)
+{
+    const size_t n = self->model->head.plant->n;
+    const size_t N = (size_t)self->model->head.plant->m * self->model->r;
+
+    blw_la_copy(n, self->x_bar, self->x_ref);
+    blw_la_copy(n, self->x_bar, self->x_hat);
+    blw_la_fill(N, BLW_R(0.0), self->eta);
+    blw_la_fill(N, BLW_R(0.0), self->average);
+}
+
+/* |average of l_i| / drift_i, or 0 as long as that is below 1; the average is advanced. */
+static blw_real_t drift_of(const blw_guard_model_t *model, size_t i, const blw_real_t *l,
+                           blw_real_t *average)
+{
+    const size_t     r    = model->r;
+    const blw_real_t gain = model->gain;
+    blw_real_t       sum  = BLW_R(0.0);
+
+    for (size_t a = 0U; a < r; a++) {
+        const blw_real_t mean = average[a] + (gain * (l[a] - average[a]));
+
+        average[a] = mean;
+        sum += mean * mean;
+    }
+    const bool quiet = sum <= (model->drift[i] * model->drift[i]);
+    return quiet ? BLW_R(0.0) : (blw_la_sqrt(sum) / model->drift[i]);
+}
+
+/* s / (1 + s) with s = |h_i| / k, or what the slow average says if that is more. */
+static void judge_sensors(blw_guard_t *self, blw_mask_t used)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   m     = model->head.plant->m;
+    blw_mask_t                     rest  = used;
+    size_t                         row   = 0U;
+
+    for (size_t i = 0U; i < m; i++) {
+        const blw_real_t drift = drift_of(model, i, &self->l[row], &self->average[row]);
+        const blw_real_t s     = blw_la_max(self->h[i], drift * model->k);
+
+        self->suspicion[i] = ((rest & 1U) != 0U) ? (s / (s + model->k)) : BLW_R(1.0);
+        rest >>= 1;
+        row += model->r;
+    }
+}
+
+static void report(blw_guard_t *self, blw_mask_t used, blw_estimator_out_t *out)
+{
+    out->x_hat      = self->x_hat;
+    out->suspicion  = self->suspicion;
+    out->threshold  = self->model->k;
+    out->excluded   = self->excluded;
+    out->used       = used;
+    out->iterations = self->updates;
+    out->flags      = blw_step_flags(self->model->head.plant, used, self->excluded);
+    if (self->warm_up > 0U) {
+        self->warm_up--;
+        out->flags = (uint8_t)(out->flags | BLW_FLAG_WARMING_UP);
+    }
+}
+
+/* Everything between (1) and (4); fills the outcome, statistic and bound. */
+static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out)
+{
+    const blw_guard_model_t *const model     = self->model;
+    bool                           converged = true;
+    blw_real_t                     largest   = test(self);
+
+    self->attacked = 0U;
+    self->excluded = 0U;
+    self->updates  = 0U;
+    if (!(largest <= (BLW_SIGNAL_MAX * BLW_SIGNAL_MAX))) {
+        *used   = mend(self, *used);
+        largest = test(self);
+    }
+    out->statistic = blw_la_sqrt(largest);
+    out->bound     = BLW_R(0.0);
+    out->outcome   = (uint8_t)BLW_OUTCOME_KALMAN;
+    if (largest <= (model->k * model->k)) {
+        for (size_t i = 0U; i < model->head.plant->m; i++) {
+            self->h[i] = blw_la_sqrt(self->h[i]);
+        }
+        fuse(self, self->e);
+        return;
+    }
+    out->bound   = blw_guard_solve(self, &converged);
+    out->outcome = (uint8_t)(converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND);
+    fuse(self, self->eta);
+}
+
+blw_status_t blw_guard_step(blw_guard_t *self, const blw_real_t *u, const blw_real_t *y,
+                            blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+    if (status != BLW_OK) {
+        return status;
+    }
+    blw_mask_t used = blw_plant_screen(plant, y, valid);
+
+    blw_plant_predict(plant, self->x_ref, u, self->x_bar);
+    advance(self, y, used);
+    decide(self, &used, out);
+    judge_sensors(self, used);
+    if (!blw_la_bounded(plant->n, self->x_hat)) {
+        restart(self);
+        used = 0U;
+    }
+    report(self, used, out);
+    return BLW_OK;
+}
+
+/* The four adapters rely on the base, and the head, being the first member (deviation D-1). */
+static size_t ops_mem_len(const blw_model_t *model)
+{
+    if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_GUARD)
+        || (model->plant == NULL)) {
+        return 0U;
+    }
+    return mem_len_of((const blw_guard_model_t *)model);
+}
+
+static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
+                             size_t mem_len)
+{
+    return blw_guard_init((blw_guard_t *)self, (const blw_guard_model_t *)model, mem, mem_len);
+}
+
+static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+{
+    return blw_guard_reset((blw_guard_t *)self, x0);
+}
+
+static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    return blw_guard_step((blw_guard_t *)self, u, y, valid, out);
+}
+
+const blw_estimator_ops_t blw_guard_ops = {
+    .method     = BLW_METHOD_GUARD,
+    .state_size = sizeof(blw_guard_t),
+    .mem_len    = ops_mem_len,
+    .init       = ops_init,
+    .reset      = ops_reset,
+    .step       = ops_step,
+};

@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: MIT */
+/* Products with S, whose blocks below the diagonal are stored sensor by sensor in strips. */
+#include "blw_guard_internal.h"
+#include "blw_guard_strips.h"
+
+static const blw_real_t *rows_of(const blw_guard_model_t *model, size_t i)
+{
+    const size_t r = model->r;
+
+    return &model->S[(r * r * i * (i - 1U)) / 2U];
+}
+
+void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau, blw_real_t *l)
+{
+    const size_t      r   = model->r;
+    const size_t      m   = model->head.plant->m;
+    const blw_real_t *S   = model->S;
+    size_t            row = 0U;
+
+    for (size_t i = 0U; i < m; i++) {
+        const size_t checked = model->rank[i];
+
+        for (size_t a = 0U; a < r; a++) { /* S_ii = diag(I, 0) */
+            l[row + a] = (a < checked) ? tau[row + a] : BLW_R(0.0);
+        }
+        guard_both(r, row, S, &tau[row], tau, &l[row], l);
+        S += r * row;
+        row += r;
+    }
+}
+
+void blw_guard_spread(const blw_guard_model_t *model, size_t i, const blw_real_t *step,
+                      blw_real_t *l)
+{
+    const size_t r = model->r;
+    const size_t m = model->head.plant->m;
+
+    if (i > 0U) {
+        guard_mul_t(r, i * r, rows_of(model, i), step, l, l);
+    }
+    for (size_t j = i + 1U; j < m; j++) {
+        guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &l[j * r]);
+    }
+}
+
+void blw_guard_row(const blw_guard_model_t *model, size_t i, size_t j, size_t a, blw_real_t *row)
+{
+    const size_t            r     = model->r;
+    const size_t            first = a - (a % GUARD_STRIP);
+    const size_t            width = ((r - first) < GUARD_STRIP) ? (r - first) : GUARD_STRIP;
+    const blw_real_t *const M     = &rows_of(model, i)[(first * i * r) + (j * r * width)];
+
+    for (size_t c = 0U; c < r; c++) {
+        row[c] = M[(c * width) + (a - first)];
+    }
+}

@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: MIT */
+/** @file blw_guard_internal.h  Private: what the parts of `guard` share.
+ */
+#ifndef BLW_GUARD_INTERNAL_H
+#define BLW_GUARD_INTERNAL_H
+#include "blw/blw_guard.h"
+
+/** l = S tau, every row. */
+void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau, blw_real_t *l);
+/** Add S_ji step to l_j for all sensors j but i. */
+void blw_guard_spread(const blw_guard_model_t *model, size_t i, const blw_real_t *step,
+                      blw_real_t *l);
+/** Copy row a of S_ij, i > j, to row [r]. */
+void blw_guard_row(const blw_guard_model_t *model, size_t i, size_t j, size_t a, blw_real_t *row);
+
+/** Check every table and dimension. */
+blw_status_t blw_guard_check(const blw_guard_model_t *model);
+
+/** Solve (2) from e [N] and l = S e; tau is left in self->eta.  Fills h, attacked, excluded.
+ *  @return the bound on |x_hat - that of the minimiser|. */
+blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged);
+/** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors. */
+blw_mask_t blw_guard_search(blw_guard_t *self);
+/** Copy S_II, I = set of at most model->most sensors, to self->L.  @return its rows. */
+size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set);
+/** Factor the first rows of self->L in place.  Directions that nothing outside the set can check
+ *  get a zero on the diagonal. */
+void blw_guard_factor(const blw_guard_t *self, size_t rows);
+/** x = L^-1 x.  @return its squared length. */
+blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x);
+/** x = L'^-1 x */
+void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x);
+/** One Newton step of (2) on the sensors of the set, at most model->most.  @return false with nothing
+ *  changed if an attack would change sides, where the model of second order is of no use. */
+bool blw_guard_newton(blw_guard_t *self, blw_mask_t set);
+
+static inline bool guard_has(blw_mask_t mask, size_t i)
+{
+    return ((mask >> i) & 1U) != 0U;
+}
+
+static inline blw_mask_t guard_bit(size_t i)
+{
+    return (blw_mask_t)1U << i;
+}
+
+#endif

@@ -1,0 +1,235 @@
+/* SPDX-License-Identifier: MIT */
+/* Several sensors at once: factors of S_II, Newton steps, and the search over all sets.
+ *
+ * Removing I lowers the least squares (2) without penalty by l_I' S_II^-1 l_I / 2.           (6) */
+#include "blw_guard_internal.h"
+#include "blw_la.h"
+
+/* A pivot of S_II (whose diagonal is 1) below this belongs to a direction that the sensors outside
+ * I check a hundred times worse than all sensors do together, and in which float has few digits
+ * left. */
+#define PIVOT_MIN BLW_R(1e-4)
+
+/* A Newton step may shorten an attack to this part of its length, not further. */
+#define SHORTEST BLW_R(0.05)
+
+size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   r     = model->r;
+    size_t                         row   = 0U;
+
+    for (size_t i = 0U; i < model->head.plant->m; i++) {
+        for (size_t a = 0U; guard_has(set, i) && (a < r); a++) {
+            blw_real_t *to = &self->L[blw_la_packed_row(row)];
+
+            for (size_t j = 0U; j < i; j++) {
+                if (guard_has(set, j)) {
+                    blw_guard_row(model, i, j, a, to);
+                    to += r;
+                }
+            }
+            blw_la_fill(a, BLW_R(0.0), to);
+            to[a] = (a < model->rank[i]) ? BLW_R(1.0) : BLW_R(0.0);
+            row++;
+        }
+    }
+    return row;
+}
+
+void blw_guard_factor(const blw_guard_t *self, size_t rows)
+{
+    for (size_t i = 0U; i < rows; i++) {
+        blw_real_t *const Li = &self->L[blw_la_packed_row(i)];
+
+        for (size_t j = 0U; j < i; j++) {
+            const blw_real_t *const Lj = &self->L[blw_la_packed_row(j)];
+
+            Li[j] = (Lj[j] > BLW_R(0.0)) ? ((Li[j] - blw_la_dot(j, Li, Lj)) / Lj[j]) : BLW_R(0.0);
+        }
+        const blw_real_t pivot = Li[i] - blw_la_dot(i, Li, Li);
+        Li[i]                  = (pivot > PIVOT_MIN) ? blw_la_sqrt(pivot) : BLW_R(0.0);
+    }
+}
+
+blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x)
+{
+    blw_real_t total = BLW_R(0.0);
+
+    for (size_t i = 0U; i < rows; i++) {
+        const blw_real_t *const Li = &self->L[blw_la_packed_row(i)];
+
+        x[i] = (Li[i] > BLW_R(0.0)) ? ((x[i] - blw_la_dot(i, Li, x)) / Li[i]) : BLW_R(0.0);
+        total += x[i] * x[i];
+    }
+    return total;
+}
+
+void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x)
+{
+    for (size_t i = rows; i-- > 0U;) {
+        const blw_real_t *const Li = &self->L[blw_la_packed_row(i)];
+
+        if (Li[i] > BLW_R(0.0)) { /* otherwise x_i is 0 */
+            x[i] /= Li[i];
+            blw_la_axpy(i, -x[i], Li, x);
+        }
+    }
+}
+
+/* Right side l_i - k nu_i / |nu_i| of the Newton step for one sensor with a penalty, and its
+ * curvature k (I - nu_i nu_i' / |nu_i|^2) / |nu_i| on the diagonal of S_II from `row` on. */
+static void add_penalty(const blw_guard_t *self, size_t i, size_t row, blw_real_t *right)
+{
+    const size_t            r     = self->model->r;
+    const blw_real_t *const e     = &self->e[i * r];
+    const blw_real_t *const tau   = &self->eta[i * r];
+    blw_real_t              total = BLW_R(0.0);
+
+    for (size_t a = 0U; a < r; a++) {
+        total += (e[a] - tau[a]) * (e[a] - tau[a]);
+    }
+    const blw_real_t bend = self->model->k / blw_la_sqrt(total);
+    for (size_t a = 0U; a < r; a++) {
+        blw_real_t *const La = &self->L[blw_la_packed_row(row + a) + row];
+
+        right[a] -= bend * (e[a] - tau[a]);
+        for (size_t c = 0U; c <= a; c++) {
+            La[c] -= (bend / total) * (e[a] - tau[a]) * (e[c] - tau[c]);
+        }
+        La[a] += bend;
+    }
+}
+
+/* Whether nu_i keeps its side, and its length by and large, if `step` is added to it. */
+static bool within_reach(const blw_guard_t *self, size_t i, const blw_real_t *step)
+{
+    const size_t            r      = self->model->r;
+    const blw_real_t *const e      = &self->e[i * r];
+    const blw_real_t *const tau    = &self->eta[i * r];
+    blw_real_t              before = BLW_R(0.0);
+    blw_real_t              after  = BLW_R(0.0);
+
+    for (size_t a = 0U; a < r; a++) {
+        const blw_real_t nu = e[a] - tau[a];
+
+        before += nu * nu;
+        after += nu * (nu + step[a]);
+    }
+    return after >= (SHORTEST * before);
+}
+
+/* The Newton step into self->step.  @return whether it is within reach. */
+static bool find_step(blw_guard_t *self, blw_mask_t set)
+{
+    const size_t r    = self->model->r;
+    const size_t m    = self->model->head.plant->m;
+    const size_t rows = blw_guard_gather(self, set);
+    size_t       row  = 0U;
+    bool         good = true;
+
+    for (size_t i = 0U; i < m; i++) {
+        if (!guard_has(set, i)) {
+            continue;
+        }
+        blw_la_copy(r, &self->l[i * r], &self->step[row]);
+        if (!guard_has(self->excluded, i)) {
+            add_penalty(self, i, row, &self->step[row]);
+        }
+        row += r;
+    }
+    blw_guard_factor(self, rows);
+    (void)blw_guard_reduce(self, rows, self->step);
+    blw_guard_expand(self, rows, self->step);
+    row = 0U;
+    for (size_t i = 0U; i < m; i++) {
+        if (guard_has(set & ~self->excluded, i)) {
+            good = good && within_reach(self, i, &self->step[row]);
+        }
+        row += guard_has(set, i) ? r : 0U;
+    }
+    return good;
+}
+
+bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   r     = model->r;
+    blw_real_t                    *step  = self->step;
+
+    if (!find_step(self, set)) {
+        return false;
+    }
+    for (size_t i = 0U; i < model->head.plant->m; i++) {
+        if (!guard_has(set, i)) {
+            continue;
+        }
+        for (size_t a = 0U; a < r; a++) {
+            step[a] = (a < model->rank[i]) ? -step[a] : BLW_R(0.0);
+            self->eta[(i * r) + a] += step[a];
+            self->l[(i * r) + a] += step[a];
+        }
+        blw_guard_spread(model, i, step, self->l);
+        step += r;
+    }
+    self->attacked |= set;
+    return true;
+}
+
+/* Sensors of the units in `units`. */
+static blw_mask_t sensors_of(const blw_guard_model_t *model, blw_mask_t units)
+{
+    blw_mask_t sensors = 0U;
+
+    for (size_t i = 0U; i < model->head.plant->m; i++) {
+        sensors |= guard_has(units, model->unit[i]) ? guard_bit(i) : 0U;
+    }
+    return sensors;
+}
+
+/* The next larger number with as many bits set; units /= 0. */
+static blw_mask_t next_of_same_size(blw_mask_t units)
+{
+    const blw_mask_t low    = units & (~units + 1U);
+    const blw_mask_t ripple = units + low;
+
+    return (ripple == 0U) ? 0U : (ripple | (((units ^ ripple) >> 2) / low));
+}
+
+/* (6) for one set. */
+static blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
+{
+    const size_t r    = self->model->r;
+    const size_t rows = blw_guard_gather(self, set);
+    blw_real_t  *to   = self->step;
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        if (guard_has(set, i)) {
+            blw_la_copy(r, &self->l[i * r], to);
+            to += r;
+        }
+    }
+    blw_guard_factor(self, rows);
+    return blw_guard_reduce(self, rows, self->step);
+}
+
+blw_mask_t blw_guard_search(blw_guard_t *self)
+{
+    const blw_guard_model_t *const model = self->model;
+    const blw_mask_t               all   = BLW_MASK_ALL(model->n_units);
+    blw_mask_t                     units = BLW_MASK_ALL(model->head.plant->p);
+    blw_mask_t                     best  = sensors_of(model, units);
+    blw_real_t                     most  = BLW_R(-1.0);
+
+    while ((units != 0U) && (units <= all)) {
+        const blw_mask_t set       = sensors_of(model, units);
+        const blw_real_t explained = explained_by(self, set);
+
+        if (explained > most) {
+            most = explained;
+            best = set;
+        }
+        units = next_of_same_size(units);
+    }
+    return best;
+}

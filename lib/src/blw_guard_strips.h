@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: MIT */
+/** @file blw_guard_strips.h  Private: products with matrices in strips.
+ *
+ *  A strip of three rows loads every x once for three sums, and the symmetric product loads every
+ *  entry of S once for both of its places.  The width of a strip is a constant wherever the inner
+ *  functions are used, so that the compiler keeps the sums in registers; that is why they are
+ *  inline.  M [rows x cols]; a product takes `count` of its columns from `first` on.
+ */
+#ifndef BLW_GUARD_STRIPS_H
+#define BLW_GUARD_STRIPS_H
+#include "blw/blw_real.h"
+
+/** Rows of a strip. */
+#define GUARD_STRIP 3U
+
+static inline void guard_mul_strip(size_t width, size_t count, const blw_real_t *M,
+                                   const blw_real_t *x, blw_real_t *y)
+{
+    blw_real_t sum[GUARD_STRIP] = {BLW_R(0.0)};
+
+    for (size_t c = 0U; c < count; c++) {
+        for (size_t a = 0U; a < width; a++) {
+            sum[a] += M[(c * width) + a] * x[c];
+        }
+    }
+    for (size_t a = 0U; a < width; a++) {
+        y[a] += sum[a];
+    }
+}
+
+static inline void guard_mul_t_strip(size_t width, size_t count, const blw_real_t *M,
+                                     const blw_real_t *x, const blw_real_t *from, blw_real_t *to)
+{
+    blw_real_t x_rows[GUARD_STRIP] = {BLW_R(0.0)};
+
+    for (size_t a = 0U; a < width; a++) {
+        x_rows[a] = x[a];
+    }
+    for (size_t c = 0U; c < count; c++) {
+        blw_real_t sum = M[c * width] * x_rows[0];
+
+        for (size_t a = 1U; a < width; a++) {
+            sum += M[(c * width) + a] * x_rows[a];
+        }
+        to[c] = from[c] + sum;
+    }
+}
+
+static inline void guard_both_strip(size_t width, size_t count, const blw_real_t *M,
+                                    const blw_real_t *x_rows, const blw_real_t *x_cols,
+                                    blw_real_t *y_rows, blw_real_t *y_cols)
+{
+    blw_real_t x[GUARD_STRIP]   = {BLW_R(0.0)};
+    blw_real_t sum[GUARD_STRIP] = {BLW_R(0.0)};
+
+    for (size_t a = 0U; a < width; a++) {
+        x[a] = x_rows[a];
+    }
+    for (size_t c = 0U; c < count; c++) {
+        blw_real_t back = y_cols[c];
+
+        for (size_t a = 0U; a < width; a++) {
+            sum[a] += M[(c * width) + a] * x_cols[c];
+            back += M[(c * width) + a] * x[a];
+        }
+        y_cols[c] = back;
+    }
+    for (size_t a = 0U; a < width; a++) {
+        y_rows[a] += sum[a];
+    }
+}
+
+/** y [rows] += M x [count] */
+static inline void guard_mul(size_t rows, size_t cols, size_t first, size_t count,
+                             const blw_real_t *M, const blw_real_t *x, blw_real_t *y)
+{
+    size_t a = 0U;
+
+    for (; (a + 3U) <= rows; a += 3U) {
+        guard_mul_strip(3U, count, &M[(a * cols) + (first * 3U)], x, &y[a]);
+    }
+    if ((rows - a) == 2U) {
+        guard_mul_strip(2U, count, &M[(a * cols) + (first * 2U)], x, &y[a]);
+    } else if ((rows - a) == 1U) {
+        guard_mul_strip(1U, count, &M[(a * cols) + first], x, &y[a]);
+    } else {
+        /* all rows are done */
+    }
+}
+
+/** to [cols] = from + M' x [rows], all columns; rows >= 1 */
+static inline void guard_mul_t(size_t rows, size_t cols, const blw_real_t *M, const blw_real_t *x,
+                               const blw_real_t *from, blw_real_t *to)
+{
+    const blw_real_t *start = from;
+    size_t            a     = 0U;
+
+    for (; (a + 3U) <= rows; a += 3U) {
+        guard_mul_t_strip(3U, cols, &M[a * cols], &x[a], start, to);
+        start = to;
+    }
+    if ((rows - a) == 2U) {
+        guard_mul_t_strip(2U, cols, &M[a * cols], &x[a], start, to);
+    } else if ((rows - a) == 1U) {
+        guard_mul_t_strip(1U, cols, &M[a * cols], &x[a], start, to);
+    } else {
+        /* all rows are done */
+    }
+}
+
+/** y_rows += M x_cols, y_cols += M' x_rows, all columns. */
+static inline void guard_both(size_t rows, size_t cols, const blw_real_t *M,
+                              const blw_real_t *x_rows, const blw_real_t *x_cols,
+                              blw_real_t *y_rows, blw_real_t *y_cols)
+{
+    size_t a = 0U;
+
+    for (; (a + 3U) <= rows; a += 3U) {
+        guard_both_strip(3U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
+    }
+    if ((rows - a) == 2U) {
+        guard_both_strip(2U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
+    } else if ((rows - a) == 1U) {
+        guard_both_strip(1U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
+    } else {
+        /* all rows are done */
+    }
+}
+
+#endif

@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: MIT
+"""Method `guard`: secure fusion with one penalty per sensor, tables of blw_guard.h (SPEC 4.1).
+
+The derivation is in docs/guard.md; the local filters are made by guard_filters, their fusion by
+guard_fusion, poles for fewer local states than n by guard_order.
+"""
+
+from dataclasses import dataclass, field
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blw import guard_fusion, guard_order
+from blw.design import Designed
+from blw.errors import DesignError, ModelError
+from blw.guard_filters import Filters, filters
+from blw.guard_fusion import Fusion
+from blw.kalman import Kalman
+from blw.l1 import probability
+from blw.model import Model
+from blw.tables import Struct, Table, index, real, table
+
+Array = NDArray
+
+NAME = "guard"
+
+DEFAULT_RECOVERY = 0.99
+
+#: Exclusion threshold where none is given, relative to k.
+EXCLUDE = 1.5
+
+#: Rows of a strip, BLW_GUARD_STRIP.
+STRIP = 3
+
+#: Initial errors this many times larger than P0 says must not look like an attack after warm-up.
+START_ERROR = 10.0
+LONGEST_WARM_UP = 10_000
+
+#: Gain of the slow average of the multipliers, and false alarms per sensor and step.
+DRIFT_GAIN = 1.0 / 32.0
+DRIFT_SIGMAS = 5.0
+
+#: Sensors beside the p excluded units that a Newton step has room for.
+NEWTON_RESERVE = 3
+
+#: Sets of units times multiply-adds for each that a search may cost in a step.
+SEARCH_LIMIT = 2_000_000
+
+
+@dataclass(frozen=True)
+class Options:
+    """[method.guard] of a model file."""
+
+    recovery_probability: float | None = field(default=None, metadata={"gt": 0.0, "le": 0.9999})
+    k: float | None = field(default=None, metadata={"gt": 0.0})
+    exclude: float | None = field(default=None, metadata={"gt": 0.0})
+    order: int | None = field(default=None, metadata={"ge": 1})
+    max_updates: int | None = field(default=None, metadata={"ge": 1, "le": 65535})
+
+
+def design(model: Model, kalman: Kalman, options: Options) -> Designed:
+    """Tables and figures of `guard` for one model.  Raises ModelError, DesignError."""
+    check_options(options, model)
+    poles = np.linalg.eigvals(kalman.Acl)
+    bank = filters(model, guard_order.reduced(poles, options.order or model.n))
+    try:
+        fusion = guard_fusion.fuse(bank)
+    except np.linalg.LinAlgError:
+        raise DesignError("the covariance of the local filters is not positive definite in double"
+                          " precision; scale the units of the model") from None
+    limits = choose_limits(model, kalman, options, bank, fusion)
+    info = {
+        **limits.figures,
+        "search": limits.search,
+        "max_updates": limits.max_updates,
+        "warm_up_steps": limits.warm_up,
+        **filter_figures(model, kalman, bank, fusion),
+        **guard_order.curve(model, poles, bank),
+    }
+    tables = struct(model, bank, fusion, limits)
+    return Designed(tables, info, mem=(model.n, model.m, bank.r, newton_sensors(model)))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Thresholds and bounds of one design."""
+
+    k: float
+    exclude: float
+    search: bool
+    max_updates: int
+    warm_up: int
+    figures: dict[str, Any]
+
+
+def choose_limits(
+    model: Model, kalman: Kalman, options: Options, bank: Filters, fusion: Fusion
+) -> Limits:
+    """As given, or from the wanted probability of returning exactly the Kalman estimate."""
+    samples = guard_fusion.largest_multiplier(fusion)
+    wanted = options.recovery_probability or DEFAULT_RECOVERY
+    k = options.k or float(np.quantile(samples, wanted))
+    exclude = options.exclude or EXCLUDE * k
+    if exclude < k:
+        raise ModelError(f"method.{NAME}: exclude is {exclude:g}; it must be at least k = {k:g}")
+    ratios = guard_fusion.ratios(fusion, model.units, model.p)
+    search = needs_search(model, ratios, newton_sensors(model) * bank.r)
+    return Limits(
+        k=k,
+        exclude=exclude,
+        search=search,
+        max_updates=options.max_updates or default_updates(model, search),
+        warm_up=warm_up_steps(model, kalman, bank, fusion),
+        figures={
+            "k": k,
+            "exclude": exclude,
+            "recovery_probability": probability(samples, k),
+            "k_for_recovery": {str(p): float(np.quantile(samples, p)) for p in (0.9, 0.99, 0.999)},
+            "k_if_independent": guard_fusion.chi2_threshold(fusion, wanted),
+            "ratio": ratios.tolist(),
+        },
+    )
+
+
+def struct(model: Model, bank: Filters, fusion: Fusion, limits: Limits) -> Struct:
+    """Tables blw_guard_model_t."""
+    sets = guard_fusion.unit_sets(model.units, model.p)
+    return Struct("blw_guard_model_t", NAME, {
+        "r": bank.r,
+        "n_u": bank.split.n_u,
+        "n_units": len(model.units),
+        "most": newton_sensors(model),
+        "search": int(limits.search),
+        "max_updates": limits.max_updates,
+        "warm_up": limits.warm_up,
+        "unit": index(unit_numbers(model), "[m] the sensor's unit"),
+        "rank": index(fusion.rank, "[m] ones in S_ii"),
+        **matrices(bank, fusion),
+        "effect": table(effects(bank, fusion), "[m] |d x_hat / d tau_i|_2"),
+        "drift": table(drift_thresholds(model, bank, fusion), "[m] on |average of l_i|"),
+        "k": real(limits.k),
+        "exclude": real(limits.exclude),
+        "gain": real(DRIFT_GAIN),
+        "kappa": real(guard_fusion.kappa(fusion, bank.split.Xu, sets)),
+        "omega": real(np.sqrt(model.m) * norm(fusion.W @ fusion.Z)),
+        "sigma": real(norm(bank.split.Xs @ fusion.Sig @ fusion.Z)),
+    }, method=NAME)
+
+
+def check_options(options: Options, model: Model) -> None:
+    """Refuse options that contradict each other or the model."""
+    if options.k is not None and options.recovery_probability is not None:
+        raise ModelError(f"method.{NAME}: give k or recovery_probability, not both")
+    if options.order is not None and options.order > model.n:
+        raise ModelError(f"method.{NAME}: order is {options.order}; more local states than the"
+                         f" {model.n} of the plant gain nothing")
+
+
+def newton_sensors(model: Model) -> int:
+    """Sensors in the p largest units and some more: those that one Newton step may move."""
+    units = sorted((len(unit) for unit in model.units), reverse=True)
+    return min(model.m, sum(units[: model.p]) + NEWTON_RESERVE)
+
+
+def unit_numbers(model: Model) -> list[int]:
+    """[m] the number of each sensor's unit."""
+    return [next(j for j, unit in enumerate(model.units) if i in unit) for i in range(model.m)]
+
+
+def needs_search(model: Model, ratios: Array, rows: int) -> bool:
+    """Whether a convex penalty alone may be led astray, and a search is affordable."""
+    sets = comb(len(model.units), model.p)
+    affordable = sets * (rows**3 / 6 + rows**2) <= SEARCH_LIMIT
+    return bool(model.p > 0 and ratios.max() >= 1.0 - 1e-3 and affordable
+                and (model.p > 1 or model.groups))
+
+
+def default_updates(model: Model, search: bool) -> int:
+    """Room for the hardest of the reference systems, and for a second solution after a search."""
+    return (80 if search else 40) * max(1, model.p)
+
+
+def strips(M: Array) -> Array:
+    """M [rows x cols] three rows at a time, each strip by columns; flat."""
+    return np.concatenate([M[a : a + STRIP].T.ravel() for a in range(0, len(M), STRIP)] or [[]])
+
+
+def matrices(bank: Filters, fusion: Fusion) -> dict[str, Table | None]:
+    """The members Lam to Sig."""
+    split, r = bank.split, bank.r
+    below = [strips(fusion.S[fusion.rows(i), : i * r]) for i in range(1, bank.m)]
+    N, n_u, n_s = bank.N, split.n_u, split.As.shape[0]
+    return {
+        "Lam": table(np.concatenate([strips(L) for L in fusion.Lam]), f"[{bank.m}][{r} x {r}]"),
+        "b": table(fusion.b, f"[{bank.m}][{r}]"),
+        "S": table(np.concatenate([*below, []]), "S below its diagonal, sensor by sensor"),
+        "Fu": table(strips(fusion.Fu), f"[{n_u} x {N}]"),
+        "Gu": table(strips(fusion.Gu.T), f"[{n_u} x {N}] transposed"),
+        "Xu": table(split.Xu, "[n x n_u]") if n_s else None,
+        "Xs": table(split.Xs, "[n x n_s]"),
+        "Sig": table(strips(fusion.Sig), f"[{n_s} x {N}]"),
+    }
+
+
+def norm(M: Array) -> float:
+    """Largest singular value, 0 of an empty matrix."""
+    return float(np.linalg.norm(M, 2)) if M.size else 0.0
+
+
+def estimate_of(bank: Filters, fusion: Fusion) -> Array:
+    """[n x N] x_hat - x_bar per tau."""
+    return bank.split.Xu @ fusion.Fu + bank.split.Xs @ fusion.Sig @ fusion.S
+
+
+def effects(bank: Filters, fusion: Fusion) -> Array:
+    """[m] |x_hat| per |tau_i|."""
+    F = estimate_of(bank, fusion)
+    return np.array([norm(F[:, fusion.rows(i)]) for i in range(bank.m)])
+
+
+def warm_up_steps(model: Model, kalman: Kalman, bank: Filters, fusion: Fusion) -> int:
+    """Steps until an initial error of START_ERROR times P0 moves no |l_i| by more than 1."""
+    root = np.linalg.cholesky(kalman.P + 1e-14 * np.trace(kalman.P) * np.eye(model.n))
+    if model.P0 is not None:
+        values, vectors = np.linalg.eigh(model.P0)
+        root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    split, m, r = bank.split, bank.m, bank.r
+    eps = -(fusion.Gu @ split.Tu @ root)
+    xs = split.Ts @ root
+    drive = model.C @ split.Xs @ split.As
+    for steps in range(LONGEST_WARM_UP):
+        l = (fusion.S @ eps).reshape(m, r, -1)
+        if START_ERROR * max(norm(block) for block in l) <= 1.0 and steps > 0:
+            return steps
+        pushed = fusion.b[:, :, None] * (drive @ xs)[:, None, :]
+        eps = (fusion.Lam @ eps.reshape(m, r, -1) + pushed).reshape(m * r, -1)
+        xs = split.As @ xs
+    return LONGEST_WARM_UP
+
+
+def drift_thresholds(model: Model, bank: Filters, fusion: Fusion) -> Array:
+    """[m] DRIFT_SIGMAS above the benign mean of |average of l_i|^2, moment by moment.
+
+    The average is s = g sum_j (1-g)^j l(k-j); with F the dynamics of (eps, xs) and a = 1 - g,
+    cov s = g / (2 - g) (V + Y + Y'),  Y = (I - a F)^-1 a F V, in the rows of l = S eps.
+    """
+    a, r, N = 1.0 - DRIFT_GAIN, bank.r, bank.N
+    V, Vs = fusion.W, fusion.Sig
+    drive = model.C @ bank.split.Xs @ bank.split.As
+    As = bank.split.As
+    Ys = np.linalg.solve(np.eye(len(As)) - a * As, a * As @ Vs)
+    pushed = a * drive @ (Vs + Ys)  # [m x N]
+    Y = np.empty((N, N))
+    for i in range(bank.m):
+        rows = fusion.rows(i)
+        right = a * fusion.Lam[i] @ V[rows] + np.outer(fusion.b[i], pushed[i])
+        Y[rows] = np.linalg.solve(np.eye(r) - a * fusion.Lam[i], right)
+    cov = fusion.S @ (V + Y + Y.T) @ fusion.S * (DRIFT_GAIN / (2.0 - DRIFT_GAIN))
+    found = []
+    for i in range(bank.m):
+        block = cov[fusion.rows(i), fusion.rows(i)]
+        mean, spread = np.trace(block), np.sqrt(2.0 * np.sum(block * block))
+        found.append(np.sqrt(max(mean + DRIFT_SIGMAS * spread, 1e-12)))
+    return np.array(found)
+
+
+def filter_figures(model: Model, kalman: Kalman, bank: Filters, fusion: Fusion) -> dict[str, Any]:
+    """What a reader wants to know about filters and fusion."""
+    unchecked = [model.sensors[i] for i in range(model.m) if fusion.rank[i] < bank.r]
+    return {
+        "local_states": bank.r,
+        "secure_modes": bank.split.n_u,
+        "cond_W": float(np.linalg.cond(bank.W)),
+        "trace_P": guard_order.trace_P(bank),
+        "trace_P_kalman": float(np.trace(kalman.P)),
+        "unchecked_sensors": unchecked,
+    }
