@@ -307,8 +307,7 @@ blw_status_t blw_guard_step(blw_guard_t *self, const blw_real_t *u, const blw_re
 /* The four adapters rely on the base, and the head, being the first member (deviation D-1). */
 static size_t ops_mem_len(const blw_model_t *model)
 {
-    if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_GUARD)
-        || (model->plant == NULL)) {
+    if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_GUARD) || (model->plant == NULL)) {
         return 0U;
     }
     return mem_len_of((const blw_guard_model_t *)model);

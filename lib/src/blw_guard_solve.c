@@ -130,8 +130,12 @@ static void update(blw_guard_t *self, descent_t *descent)
 {
     const size_t i       = descent->sensor;
     const bool   several = guard_has(self->excluded, i) && (blw_mask_count(self->excluded) > 1U);
-    const bool   again   = guard_has(self->attacked, i) && (descent->repeats++ >= PATIENCE);
+    bool         again   = false;
 
+    if (guard_has(self->attacked, i)) {
+        again = (descent->repeats >= PATIENCE);
+        descent->repeats++;
+    }
     if (!((several || again) && update_jointly(self))) {
         update_sensor(self, i);
     }
@@ -255,9 +259,8 @@ static blw_real_t bound_of(const blw_guard_t *self)
     const blw_real_t rest = ((BLW_R(1.0) - t) * (BLW_R(1.0) - t) * energy) + (penalty - (t * l_nu));
     const blw_real_t root = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), rest));
     const blw_real_t size = (BLW_R(2.0) * (energy + penalty)) / model->k;
-    const blw_real_t most =
-        (model->kappa * (size + (model->omega * root))) + (model->sigma * root);
-    const bool none = (model->n_u > 0U) && !(model->kappa > BLW_R(0.0));
+    const blw_real_t most = (model->kappa * (size + (model->omega * root))) + (model->sigma * root);
+    const bool       none = (model->n_u > 0U) && !(model->kappa > BLW_R(0.0));
     return (!none && (most <= BLW_REAL_MAX)) ? most : BLW_REAL_MAX;
 }
 

@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: MIT
 """Method guard: identities of its design, and the C library against reference and claims."""
 
+import golden
+import guard_library
 import numpy as np
 import pytest
 import scipy.linalg
+from guard_library import BOUND, CONVERGED, KALMAN, MISSING, WARMING_UP, GuardLibrary
 
-import golden
-import guard_library
 from blw import guard, guard_filters, guard_fusion, guard_order, kalman, model
 from blw.errors import DesignError, ModelError
-from guard_library import BOUND, CONVERGED, KALMAN, MISSING, WARMING_UP, GuardLibrary
 
 GOLDEN = [("paper0", "3"), ("paper0", "2"), ("complex", "3"), ("complex", "2"),
           ("jordanA", "3"), ("paper1", "3")]

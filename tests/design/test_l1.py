@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Reduced form, thresholds and error-bound constants of the l1 fusion."""
 
+import golden
 import numpy as np
 import pytest
 
-import golden
 from blw import admm_tuning, l1, lasso
 from blw.errors import DesignError
 from blw.local_filters import local_filters

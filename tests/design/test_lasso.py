@@ -3,10 +3,10 @@
 
 import re
 
+import golden
 import numpy as np
 import pytest
 
-import golden
 from blw import admm_tuning, kalman, l1, lasso, model, options
 from blw.errors import ModelError
 from blw.tables import Struct

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Local filters: identities of [L], golden tables, printed figures, refusals."""
 
+import golden
 import numpy as np
 import pytest
 
-import golden
-from blw import kalman, local_filters as lf, model
+from blw import kalman, model
+from blw import local_filters as lf
 from blw.errors import DesignError
 from blw.jordan_form import jordan_form
 

@@ -53,8 +53,8 @@ static void test_step_given_benign_samples_stays_the_kalman_filter(void)
     blw_kalman_t        kalman;
     blw_estimator_out_t kalman_out;
 
-    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_init(&kalman, &made.kalman.model, kalman_mem,
-                                                  BLW_KALMAN_MEM(1, 3)));
+    TEST_ASSERT_EQUAL_INT(
+        BLW_OK, blw_kalman_init(&kalman, &made.kalman.model, kalman_mem, BLW_KALMAN_MEM(1, 3)));
     for (size_t k = 0U; k < 20U; k++) {
         const blw_real_t y[3] = {benign[0] + (blw_real_t)k, benign[1] + (blw_real_t)k, benign[2]};
 

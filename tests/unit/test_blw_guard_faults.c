@@ -109,8 +109,8 @@ static void test_init_given_wrong_numbers_refuses(void)
 
 static void test_init_given_missing_tables_or_a_wrong_sum_refuses(void)
 {
-    const blw_real_t **const table[7] = {&made.model.Lam, &made.model.b,      &made.model.S,
-                                         &made.model.Fu,  &made.model.Gu,     &made.model.effect,
+    const blw_real_t **const table[7] = {&made.model.Lam,  &made.model.b,  &made.model.S,
+                                         &made.model.Fu,   &made.model.Gu, &made.model.effect,
                                          &made.model.drift};
 
     for (size_t i = 0U; i < 7U; i++) {
@@ -215,8 +215,8 @@ static void test_ops_serve_the_common_interface(void)
     TEST_ASSERT_EQUAL_size_t(0U, blw_guard_ops.mem_len(NULL));
     TEST_ASSERT_EQUAL_size_t(0U, blw_guard_ops.mem_len(&made.kalman.model.head));
     TEST_ASSERT_EQUAL_size_t(sizeof guard, blw_guard_ops.state_size);
-    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_init(self, &blw_guard_ops, &made.model.head, mem,
-                                                     GUARD_MEM));
+    TEST_ASSERT_EQUAL_INT(
+        BLW_OK, blw_estimator_init(self, &blw_guard_ops, &made.model.head, mem, GUARD_MEM));
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_reset(self, NULL));
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_estimator_step(self, u, benign, 7U, &out));
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 3.0, out.x_hat[0]);

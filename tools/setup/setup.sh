@@ -89,7 +89,7 @@ ensure_unity() {
     set -- -qq -o APT::Sandbox::User= -o Dir::Etc::SourceList=/dev/null \
         -o "Dir::Etc::SourceParts=$apt/sources" -o "Dir::State::Lists=$apt/lists" \
         -o "Dir::Cache=$apt/cache"
-    { apt-get "$@" update && cd "$apt" && apt-get "$@" source --download-only ntpsec; } >&2 ||
+    (cd "$apt" && apt-get "$@" update && apt-get "$@" source --download-only ntpsec) >&2 ||
         fail "the source package ntpsec could not be fetched"
     tar -xf "$apt"/ntpsec_*.orig.tar.* -C "$build/unity.part" --strip-components=3 --wildcards \
         '*/tests/unity/unity*.[ch]' || fail "Unity is not in the source package ntpsec"

@@ -59,8 +59,8 @@ typedef struct blw_guard_model {
     blw_real_t        gain;        /**< of the exponentially weighted average of l_i, (0, 1] */
     blw_real_t        kappa;       /**< |Xu x| <= kappa sum_i |Gu_i x|, whatever p units are left
                                         out of the sum; 0 if there is no such number */
-    blw_real_t        omega;       /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
-    blw_real_t        sigma;       /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
+    blw_real_t        omega; /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
+    blw_real_t        sigma; /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
 } blw_guard_model_t;
 
 /** Estimator state.  The caller owns it; the members are private. */
