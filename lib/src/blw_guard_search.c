@@ -13,24 +13,28 @@
 /* A Newton step may shorten an attack to this part of its length, not further. */
 #define SHORTEST BLW_R(0.05)
 
-size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
+/* Row a of sensor i in S_II up to its diagonal. */
+static void gather_row(const blw_guard_t *self, blw_mask_t set, size_t i, size_t a, blw_real_t *to)
 {
     const blw_guard_model_t *const model = self->model;
-    const size_t                   r     = model->r;
-    size_t                         row   = 0U;
 
-    for (size_t i = 0U; i < model->head.plant->m; i++) {
-        for (size_t a = 0U; guard_has(set, i) && (a < r); a++) {
-            blw_real_t *to = &self->L[blw_la_packed_row(row)];
+    for (size_t j = 0U; j < i; j++) {
+        if (guard_has(set, j)) {
+            blw_guard_row(model, i, j, a, to);
+            to += model->r;
+        }
+    }
+    blw_la_fill(a, BLW_R(0.0), to);
+    to[a] = (a < model->rank[i]) ? BLW_R(1.0) : BLW_R(0.0);
+}
 
-            for (size_t j = 0U; j < i; j++) {
-                if (guard_has(set, j)) {
-                    blw_guard_row(model, i, j, a, to);
-                    to += r;
-                }
-            }
-            blw_la_fill(a, BLW_R(0.0), to);
-            to[a] = (a < model->rank[i]) ? BLW_R(1.0) : BLW_R(0.0);
+size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
+{
+    size_t row = 0U;
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        for (size_t a = 0U; guard_has(set, i) && (a < self->model->r); a++) {
+            gather_row(self, set, i, a, &self->L[blw_la_packed_row(row)]);
             row++;
         }
     }
