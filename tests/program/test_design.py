@@ -85,11 +85,11 @@ def write(folder: Path, text: str) -> Path:
     return file
 
 
-def test_design_given_model_writes_the_three_files(tmp_path):
+def test_design_given_model_writes_the_four_files(tmp_path):
     done = design(MODELS / "pendulum.toml", "--out", "out", "--method", "kalman", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "pendulum.json", "pendulum_model.c", "pendulum_model.h"]
+        "pendulum.dbc", "pendulum.json", "pendulum_model.c", "pendulum_model.h"]
     document = json.loads((tmp_path / "out" / "pendulum.json").read_text())
     assert document["format"] == "bulwark-design-1"
     assert document["model"]["sensors"] == ["cart1", "cart2", "cart3", "angle"]
@@ -114,7 +114,7 @@ def test_design_given_json_prints_the_figures(tmp_path):
     figures = json.loads(done.stdout)
     assert figures["name"] == "liu5"
     assert figures["methods"]["kalman"]["trace_P"] == pytest.approx(0.8317, abs=5e-5)
-    assert len(figures["files"]) == 3
+    assert len(figures["files"]) == 4
 
 
 def test_design_given_unknown_model_serves_it(tmp_path):

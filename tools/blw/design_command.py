@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from blw import kalman
+from blw import dbc, kalman
 from blw.atomic import write_files
 from blw.design import Design, design_all, document, json_text
 from blw.emit_c import files
@@ -15,10 +15,10 @@ from blw.model import load
 from blw.progress import steps
 
 
-@click.command(short_help="A model to tables: NAME.json, NAME_model.h and .c.")
+@click.command(short_help="A model to tables: NAME.json, NAME_model.h and .c, NAME.dbc.")
 @click.argument("model", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path, file_okay=False),
-              help="Folder for NAME.json, NAME_model.h and NAME_model.c; made if missing.")
+              help="Folder for NAME.json, NAME_model.h, NAME_model.c, NAME.dbc; made if missing.")
 @click.option("--method", "methods", multiple=True, metavar="METHOD",
               help="Method to design beside kalman; may be repeated.  Default: all that accept "
                    "the model.")
@@ -33,7 +33,9 @@ def design(model: Path, out: Path, methods: tuple[str, ...], as_json: bool) -> N
         reasons = "; ".join(f"{name}: {reason}" for name, reason in result.refused.items())
         raise DesignError(f"{model}: no method accepts this model: {reasons}")
     text = json_text(document(result))
-    written = write_files(out, {f"{result.model.name}.json": text, **files(result)})
+    name = result.model.name
+    written = write_files(out, {f"{name}.json": text, **files(result),
+                                f"{name}.dbc": dbc.text(result.model)})
     summary = _summary(result, written)
     click.echo(json_text(summary) if as_json else _text(result, written), nl=not as_json)
 
