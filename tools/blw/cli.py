@@ -21,6 +21,8 @@ COMMANDS = {
     "report": "blw.report.command:report",
     "import": "blw.importer:import_",
     "joint": "blw.joint_command:joint_group",
+    "bench": "blw.cost.command:bench",
+    "size": "blw.cost.command:size",
     "doctor": "blw.doctor:doctor",
     "test": "blw.testing:test",
 }

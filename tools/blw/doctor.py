@@ -43,7 +43,7 @@ def doctor(as_json: bool) -> None:
 
 
 def _packages() -> dict[str, str]:
-    """Debian package -> what it is for (python, build or test)."""
+    """Debian package -> what it is for (a group of tools/setup/packages)."""
     lines = PACKAGES.read_text(encoding="utf-8").splitlines()
     pairs = (line.split() for line in lines if line and not line.startswith("#"))
     return {name: group for group, name in pairs}

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: MIT
+"""`bulwark bench` and `bulwark size`: what they print, and that it is what was executed."""
+
+import json
+import shutil
+
+import pytest
+
+KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
+        "instructions_worst", "flash_bytes", "ram_bytes", "stack_bytes"}
+
+pytestmark = pytest.mark.skipif(
+    not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
+    reason="no arm-none-eabi-gcc or no qemu-system-arm")
+
+
+@pytest.fixture(scope="module")
+def kalman_bench(bulwark):
+    done = bulwark("bench", "--target", "m4f", "--model", "liu5", "--method", "kalman", "--json")
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_bench_given_one_estimator_yields_one_complete_row(kalman_bench):
+    (row,) = json.loads(kalman_bench)["rows"]
+    assert row.keys() == KEYS
+    assert (row["target"], row["model"], row["method"]) == ("m4f", "liu5", "kalman")
+    assert 100 < row["instructions_typical"] <= row["instructions_worst"]
+    assert row["instructions_typical"] <= row["instructions_mean_attacked"]
+    assert row["ram_bytes"] == 64  # 4 + 4 + 3 pointers, 3 + 3 + 5 numbers
+    assert 0 < row["stack_bytes"] <= 512
+
+
+def test_bench_given_the_same_twice_yields_the_same_bytes(bulwark, kalman_bench):
+    again = bulwark("bench", "--target", "m4f", "--model", "liu5", "--method", "kalman", "--json")
+    assert again.stdout == kalman_bench
+
+
+def test_size_given_a_model_agrees_with_bench(bulwark, kalman_bench):
+    done = bulwark("size", "--target", "m4f", "--model", "liu5", "--method", "kalman", "--json")
+    (row,) = json.loads(done.stdout)["rows"]
+    (measured,) = json.loads(kalman_bench)["rows"]
+    assert row == {key: measured[key] for key in row}
+    assert measured.keys() - row.keys() == {key for key in KEYS if key.startswith("instructions")}
+
+
+def test_size_given_a_method_that_refuses_lists_the_reason(bulwark):
+    done = bulwark("size", "--target", "m4f", "--model", "liu5", "--method", "canonical", "--json")
+    printed = json.loads(done.stdout)
+    assert printed["rows"] == []
+    (refusal,) = printed["refused"]
+    assert (refusal["model"], refusal["method"]) == ("liu5", "canonical")
+    assert "derogatory" in refusal["reason"]
+
+
+@pytest.mark.parametrize("option, value, hint", [
+    ("--target", "m4", "m4f"), ("--model", "lui5", "liu5"), ("--method", "lassoo", "lasso")])
+def test_bench_given_an_unknown_name_is_refused_with_a_hint(bulwark, refused, option, value, hint):
+    message = refused(bulwark("bench", option, value))
+    assert value in message and hint in message

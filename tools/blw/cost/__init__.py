@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: MIT
+"""What an estimator costs on a microcontroller: instructions, flash, RAM and stack, measured."""

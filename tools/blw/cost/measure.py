@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: MIT
+"""Rows of the cost table: sizes and stack of every estimator, and instructions of its steps."""
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from blw.build import StepFailed
+from blw.cost import programs
+from blw.cost.cases import BENIGN_STEPS, SETTLING_STEPS, Case, Prepared, owner, prepare
+from blw.cost.programs import Program
+from blw.cost.sizes import flash_bytes, ram_bytes
+from blw.cost.stack import stack_bytes
+from blw.cost.targets import Target
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What is to be measured: programs per target, and the refusals."""
+
+    prepared: dict[str, Prepared]
+    programs: list[Program]
+    refused: list[dict[str, str]]
+
+
+def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str]) -> Bench:
+    """Design the cases and build the programs of all targets; without methods, of every one that
+    accepts the model."""
+    prepared = {case.name: prepare(case) for case in cases}
+    refused = [{"model": name, "method": method, "reason": reason}
+               for name, one in prepared.items() for method, reason in one.design.refused.items()
+               if not methods or method in methods]
+    wanted = [Program(target, name, method) for target in targets
+              for name, one in prepared.items() for method in one.design.methods
+              if not methods or method in methods]
+    for target in targets:
+        own = [program for program in wanted if program.target is target]
+        if own:
+            programs.build(target, own)
+    return Bench(prepared, wanted, refused)
+
+
+def sizes(bench: Bench) -> Iterator[dict[str, Any]]:
+    """One row per program: sizes and stack only."""
+    for program in bench.programs:
+        yield _sizes(program, bench.prepared[program.model])
+
+
+def measure(bench: Bench) -> Iterator[dict[str, Any]]:
+    """One row per program, in the order of the plan; some programs run at the same time."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        yield from pool.map(lambda program: _row(program, bench.prepared[program.model]),
+                            bench.programs)
+
+
+def _sizes(program: Program, prepared: Prepared) -> dict[str, Any]:
+    row = {"method": program.method, "model": program.model, "target": program.target.name,
+           "flash_bytes": flash_bytes(program), "ram_bytes": ram_bytes(program),
+           "stack_bytes": stack_bytes(program, owner(prepared.design, program.method))}
+    options = prepared.case.options.get(program.method)
+    return {**row, "options": dict(options)} if options else row
+
+
+def _row(program: Program, prepared: Prepared) -> dict[str, Any]:
+    records, empty = programs.run(program, prepared)
+    if np.any(records["status"] != 0) or len(records) != len(prepared.log.y):
+        raise StepFailed(f"{program.target.name}: {program.name}: a step was refused")
+    counts = programs.instructions(records, empty)
+    attacked = counts[SETTLING_STEPS + BENIGN_STEPS:]
+    benign = counts[SETTLING_STEPS:SETTLING_STEPS + BENIGN_STEPS]
+    return {**_sizes(program, prepared),
+            "instructions_typical": int(np.median(benign)),
+            "instructions_mean_attacked": round(float(attacked.mean()), 1),
+            "instructions_worst": int(counts.max())}

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: MIT
+"""Flash and RAM of one estimator, from the linker's map and the symbols of a replay program.
+
+Flash is what the linker keeps of the library's code and of the model's tables.  The compiler's own
+routines (arithmetic without an FPU, memcpy) are not in it: a firmware has them anyway.
+"""
+
+import re
+import subprocess
+
+from blw.cost.programs import Program
+
+_SECTION = re.compile(r"^ \.(text|rodata|data\.rel\.ro)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) (\S+)$",
+                      re.MULTILINE)
+_OURS = re.compile(r"libblw(_model_\w+)?\.a\(")
+_STORAGE = ("estimator", "estimator_mem")
+
+
+def flash_bytes(program: Program) -> int:
+    """Code and tables of the estimator that is linked into the program."""
+    text = program.map.read_text(encoding="utf-8").split("Linker script and memory map")[1]
+    one_line = re.sub(r"^( \.\S+)\n +", r"\1 ", text, flags=re.MULTILINE)
+    return sum(int(size, 16) for _, size, owner in _SECTION.findall(one_line)
+               if _OURS.search(owner))
+
+
+def ram_bytes(program: Program) -> int:
+    """State and memory of the estimator."""
+    listing = subprocess.run([program.target.tools + "nm", "-S", program.elf], check=True,
+                             capture_output=True, text=True).stdout
+    rows = (line.split() for line in listing.splitlines())
+    return sum(int(row[1], 16) for row in rows if row[-1] in _STORAGE)
