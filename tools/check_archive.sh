@@ -18,9 +18,10 @@ if [ ! -r "$archive" ]; then
 fi
 
 # sqrt where it is no instruction; mem... because a compiler may make them of any loop or
-# assignment; the compiler's own run-time arithmetic on targets without an FPU.
+# assignment; the compiler's own run-time arithmetic on targets without an FPU; and the library
+# itself, for an archive that builds upon it.
 run_time='__aeabi_[a-z0-9_]+|__[a-z]+[sd]i?f?[0-9]?'
-allowed="^(sqrtf?|memcpy|memmove|memset|_GLOBAL_OFFSET_TABLE_|$run_time)\$"
+allowed="^(sqrtf?|memcpy|memmove|memset|_GLOBAL_OFFSET_TABLE_|blw_[a-z0-9_]+|$run_time)\$"
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
