@@ -17,6 +17,7 @@ extern "C" {
 #define PENDULUM_PHYSICAL_M 4U /**< sensors */
 #define PENDULUM_PHYSICAL_L 1U /**< known inputs */
 #define PENDULUM_PHYSICAL_DT_S BLW_R(0.1) /**< sampling time, s */
+#define PENDULUM_PHYSICAL_MODEL_ID 0xf6ebb5d8U /**< who is meant on a bus */
 
 /** States: indices into x0 and x_hat. */
 enum {

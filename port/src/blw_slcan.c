@@ -48,7 +48,7 @@ static bool read_frame(const uint8_t *line, size_t len, blw_frame_t *frame)
     if ((len < HEAD) || !all_hex(&line[1], len - 1U)) {
         return false;
     }
-    const unsigned code  = hex_value(line[HEAD - 1U]);
+    const unsigned code  = hex_value(line[HEAD - 1U]) & 0xFU; /* it is a digit */
     const size_t   bytes = length_of[code];
     const unsigned id = (hex_value(line[1]) << 8) | (hex_value(line[2]) << 4) | hex_value(line[3]);
     const bool     whole = (len == (HEAD + (2U * bytes))) || (len == (HEAD + (2U * bytes) + STAMP));

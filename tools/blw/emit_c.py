@@ -123,7 +123,8 @@ def _sizes(model: Model) -> list[str]:
     NAME = model.name.upper()
     rows = [(f"{NAME}_N", f"{model.n}U", "states"), (f"{NAME}_M", f"{model.m}U", "sensors"),
             (f"{NAME}_L", f"{model.l}U", "known inputs"),
-            (f"{NAME}_DT_S", f"BLW_R({literal(model.dt_s)})", "sampling time, s")]
+            (f"{NAME}_DT_S", f"BLW_R({literal(model.dt_s)})", "sampling time, s"),
+            (f"{NAME}_MODEL_ID", f"0x{model.sha256[:8]}U", "who is meant on a bus")]
     return [f"#define {key} {value} /**< {what} */" for key, value, what in rows] + [""]
 
 

@@ -22,15 +22,17 @@ def run() -> Tally:
     """Run every check; prints what they find."""
     database = configure("clang-f32")
     library = _sources("lib/src", ".c")
-    written = _sources("lib/include", ".h") + _sources("lib/src", ".c", ".h") + _sources(
-        "host_sim", ".cpp", ".h") + _sources("tests", ".c", ".h", ".cpp", ".hpp")
+    port = _sources("port/src", ".c")
+    written = (_sources("lib/include", ".h") + _sources("lib/src", ".c", ".h")
+               + _sources("port", ".c", ".h") + _sources("host_sim", ".cpp", ".h")
+               + _sources("tests", ".c", ".h", ".cpp", ".hpp"))
     commands = {
         "clang-format": [[f"clang-format-{LLVM}", "--dry-run", "-Werror", *written]],
         "clang-tidy": [[f"clang-tidy-{LLVM}", "--quiet", "-p", str(database), source]
-                       for source in library],
+                       for source in library + port],
         "cppcheck": [["cppcheck", "--quiet", "--std=c99", "--inline-suppr", "--error-exitcode=1",
                       "--enable=warning,performance,portability", "-Ilib/include", "-Ilib/src",
-                      *library]],
+                      "-Iport/include", *library, *port]],
         "shellcheck": [["shellcheck", "--external-sources", *SHELL]],
         "ruff": [[sys.executable, "-m", "ruff", "check", "--quiet", "tools", "tests"]],
     }
