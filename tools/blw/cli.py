@@ -19,6 +19,7 @@ COMMANDS = {
     "run": "blw.simulate:run",
     "replay": "blw.simulate:replay",
     "report": "blw.report.command:report",
+    "export": "blw.logs.export:export",
     "import": "blw.importer:import_",
     "joint": "blw.joint_command:joint_group",
     "bench": "blw.cost.command:bench",

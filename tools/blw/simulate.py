@@ -18,6 +18,7 @@ from blw.atomic import write_files
 from blw.build import PRECISIONS, simulator
 from blw.design import design_all, document, json_text
 from blw.errors import BulwarkError
+from blw.logs import convert
 from blw.methods import REGISTRY
 from blw.model import load
 from blw.progress import steps
@@ -59,18 +60,31 @@ def run(scenario: Path, **options: Any) -> int:
 @click.option("--design", required=True, type=EXISTING_FILE,
               help="NAME.json of the design command.")
 @_shared_options
-@click.option("--format", "log_format", type=click.Choice(("csv",)), default="csv",
-              show_default=True, help="Format of the log.")
-@click.option("--map", "column_map", type=EXISTING_FILE, metavar="MAP.toml",
-              help="Columns of a foreign CSV.")
+@click.option("--format", "log_format", type=click.Choice(("csv", "candump", "lcm")),
+              default="csv", show_default=True, help="Format of the log.")
+@click.option("--map", "log_map", type=EXISTING_FILE, metavar="MAP.toml",
+              help="Columns of a foreign CSV, or signals of a foreign CAN log.")
+@click.option("--dbc", "databases", type=EXISTING_FILE, multiple=True, metavar="FILE",
+              help="DBC of the signals in the map; may be repeated.")
 @click.option("--attack", type=EXISTING_FILE, metavar="ATTACK.toml",
               help="Attack to inject; an attacks.json works too.")
 @click.option("--attack-id", metavar="ID", help="Only that attack of the file.")
-def replay(log: Path, design: Path, column_map: Path | None, log_format: str,
-           precision: str, **options: Any) -> int:
+def replay(log: Path, design: Path, log_map: Path | None, log_format: str,
+           databases: tuple[Path, ...], precision: str, **options: Any) -> int:
     """Replay the recorded LOG through the methods of a design."""
-    arguments = _arguments({"design": design, "format": log_format, "map": column_map, **options})
-    return subprocess.call([simulator(precision), "replay", log, *arguments])
+    if log_format == "csv":
+        if databases:
+            raise BulwarkError("--dbc does not go with --format csv")
+        return _replay_csv(log, precision, design=design, map=log_map, **options)
+    steps_of_log = convert.read(log, log_format, design, log_map, databases)
+    with tempfile.TemporaryDirectory(prefix="bulwark.") as folder:
+        log = convert.write(steps_of_log, log, Path(folder))
+        return _replay_csv(log, precision, design=design, **options)
+
+
+def _replay_csv(log: Path, precision: str, **options: Any) -> int:
+    return subprocess.call([simulator(precision), "replay", log,
+                            *_arguments({"format": "csv", **options})])
 
 
 def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METHOD,),
