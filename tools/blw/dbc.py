@@ -30,9 +30,11 @@ def messages(model: Model) -> list[Message]:
     y = [(f"y_{label(name)}", name) for name in model.sensors]
     u = [(f"u_{label(name)}", name) for name in model.inputs[:wire.MAX_INPUTS]]
     found = [_sync()]
-    found += [_sample(wire.ID_MEASUREMENT + i, *name) for i, name in enumerate(y)]
+    found += [_sample(wire.ID_MEASUREMENT + i, message, name, f"measurement {name} of step seq")
+              for i, (message, name) in enumerate(y)]
     found += [_zeta(wire.ID_ZETA + i, name) for i, (_, name) in enumerate(y)]
-    found += [_sample(wire.ID_INPUT + i, *name) for i, name in enumerate(u)]
+    found += [_sample(wire.ID_INPUT + i, message, name, f"input {name} that led to step seq")
+              for i, (message, name) in enumerate(u)]
     found += [_estimate(j, model.states[2 * j:2 * j + 2]) for j in range((model.n + 1) // 2)]
     found += [_status()]
     found += [_sensors(g, model.sensors[8 * g:8 * g + 8]) for g in range((model.m + 7) // 8)]
@@ -85,10 +87,10 @@ def _sync() -> Message:
     return _message(wire.ID_SYNC, "sync", signals, "a step begins")
 
 
-def _sample(identifier: int, message: str, name: str) -> Message:
+def _sample(identifier: int, message: str, name: str, comment: str) -> Message:
     signals = [_float(name, 0), _seq(32), _unsigned("valid", 48, 1, "1: the value is a sample"),
                _crc()]
-    return _message(identifier, message, signals, name)
+    return _message(identifier, message, signals, comment)
 
 
 def _zeta(identifier: int, name: str) -> Message:

@@ -74,6 +74,11 @@ def fd_length(values: int) -> int:
     return next(length for length in _FD_LENGTHS if length >= FD_HEAD + 4 * values)
 
 
+def model_id(sha256: str) -> int:
+    """What a sync carries of a model: the low 24 of the first 32 bits; 0 if it is not known."""
+    return int(sha256[:8] or "0", 16) & 0xFFFFFF
+
+
 def put_sync(k: int, model_id: int) -> bytes:
     """Frame ID_SYNC."""
     return sealed(ID_SYNC, struct.pack("<I", k) + model_id.to_bytes(4, "little")[:3] + b"\0")
@@ -81,7 +86,8 @@ def put_sync(k: int, model_id: int) -> bytes:
 
 def put_value(base: int, index: int, seq: int, value: float | None) -> bytes:
     """Frame base + index of a measurement or an input."""
-    data = struct.pack("<fHBB", value or 0.0, seq % SEQ, value is not None, 0)
+    number = 0.0 if value is None else value
+    data = struct.pack("<fHBB", number, seq % SEQ, value is not None, 0)
     return sealed(base + index, data)
 
 
@@ -135,7 +141,7 @@ def _classic(identifier: int, base: int, data: bytes) -> Values:
 def _fd(identifier: int, base: int, first: int, data: bytes) -> Values:
     count = data[4] if len(data) > 4 else 0
     sound = 0 < count <= FD_VALUES and len(data) == fd_length(count)
-    _check(identifier, data, sound)
+    _check(identifier, data, sound and data[5:7] == b"\0\0")
     seq, valid = struct.unpack("<HH", data[:4])
     values = struct.unpack(f"<{count}f", data[FD_HEAD:FD_HEAD + 4 * count])
     return Values(base, first, seq,

@@ -126,7 +126,7 @@ class _OwnFrames:
         return self.high - self.low
 
     def take(self, identifier: int, data: bytes) -> None:
-        """One frame.  Raises wire.FrameError."""
+        """One frame; an input of step k is the u(k-1) that led to it.  Raises wire.FrameError."""
         k = wire.get_sync(identifier, data)
         if k is not None and k != wire.K_END:
             self.now = k
@@ -141,7 +141,7 @@ class _OwnFrames:
             if index >= limit:
                 self.dropped["of a sensor or input that the model lacks"] += 1
             elif value is not None:
-                self._put(step, base + index, value)
+                self._put(step - (base > 0), base + index, value)
 
     def _step(self, seq: int) -> int:
         """The step nearest to the last one whose low 16 bits are seq."""
@@ -162,7 +162,7 @@ class _OwnFrames:
         """All rows; the initial one is that before the first sample."""
         sensors = len(self.names.sensors)
         first = min((k for k, column in self.values if column < sensors), default=1) - 1
-        first = max(0, min(first, self.low))
+        first = max(0, min(first, self.low - 1))
         grid = np.full((self.high - first + 1, len(self.names.signals)), math.nan)
         for (k, column), value in self.values.items():
             grid[k - first, column] = math.nan if value is None else value

@@ -21,7 +21,7 @@ SUSPICIOUS = 0.5
 
 def write(recording: Recording, track: Track, path: Path) -> None:
     """Every step: sync, measurements, inputs, then estimate, status and sensors."""
-    model_id = int(str(recording.summary.get("model_sha256", ""))[:6] or "0", 16)
+    model_id = wire.model_id(str(recording.summary.get("model_sha256", "")))
     with can.CanutilsLogWriter(path, channel=CHANNEL) as log:
         for row, k in enumerate(recording.k.tolist()):
             frames = [(wire.ID_SYNC, wire.put_sync(k, model_id)), *_samples(recording, row, k)]
@@ -41,8 +41,11 @@ def _time(recording: Recording, row: int, number: int, count: int) -> float:
 
 
 def _samples(recording: Recording, row: int, k: int) -> Iterator[tuple[int, bytes]]:
-    for base, values in ((wire.ID_MEASUREMENT, recording.y[row]),
-                         (wire.ID_INPUT, recording.u[row])):
+    """y(k), and the u(k-1) that led to it."""
+    signals = [(wire.ID_MEASUREMENT, recording.y[row])]
+    if row > 0:
+        signals.append((wire.ID_INPUT, recording.u[row - 1]))
+    for base, values in signals:
         for i, value in enumerate(values.tolist()):
             if value == value:
                 yield base + i, wire.put_value(base, i, k, value)
