@@ -40,8 +40,9 @@ Bench::Bench(const Design &design, const std::vector<std::string> &methods, bool
         estimators_.emplace_back(design, *plant_, method);
     }
     if (compare) {
-        for (const auto kind : {Comparison::Kind::augmented, Comparison::Kind::augmented_blind,
-                                Comparison::Kind::adaptive}) {
+        using Kind = Comparison::Kind;
+        for (const Kind kind : {Kind::augmented, Kind::augmented_blind, Kind::adaptive,
+                                Kind::strong_kalman, Kind::central_kalman}) {
             comparisons_.emplace_back(design, kind);
         }
     }

@@ -48,7 +48,7 @@ public:
     {
         summary["errors_against"] = has_truth_ ? "truth" : ORACLE;
         summary["attack_windows"] = summarise_windows(windows_, *design_);
-        summary["methods"]        = summarise(scores_, design_->dt_s);
+        summary["methods"]        = summarise(scores_, *design_);
         files_.add("summary.json", summary.dump(2) + "\n");
         files_.commit();
         return summary;

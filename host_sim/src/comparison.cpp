@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "comparison.h"
 #include "error.h"
+#include <set>
 
 namespace sim
 {
@@ -9,20 +10,10 @@ namespace
 
 const double FORGETTING = 0.98; /* lambda of [33] */
 
-/* names[0] of a pair [weak, [strong, ...]], then the strong ones. */
-std::vector<Eigen::Index> pair_sensors(const Design &design, const Json &pair)
+Eigen::Index sensor_of(const Design &design, const Json &name)
 {
-    const std::string         where = design.path + ": methods.joint.info.pairs";
-    std::vector<Eigen::Index> found;
-    const auto                add = [&](const Json &name) {
-        const std::size_t sensor = design.sensor_index(name.get<std::string>(), where);
-        found.push_back(static_cast<Eigen::Index>(sensor));
-    };
-    add(pair.at(0));
-    for (const Json &name : pair.at(1)) {
-        add(name);
-    }
-    return found;
+    const std::string where = design.path + ": methods.joint.info.pairs";
+    return static_cast<Eigen::Index>(design.sensor_index(name.get<std::string>(), where));
 }
 
 } // namespace
@@ -30,23 +21,55 @@ std::vector<Eigen::Index> pair_sensors(const Design &design, const Json &pair)
 Comparison::Comparison(const Design &design, Kind kind) : design_(&design), kind_(kind)
 {
     design.method("joint");
-    const auto n = static_cast<Eigen::Index>(design.n);
+    const auto n           = static_cast<Eigen::Index>(design.n);
+    A_                     = Eigen::MatrixXd::Identity(n + 1, n + 1);
+    A_.topLeftCorner(n, n) = design.A;
+    W_                     = Eigen::MatrixXd::Zero(n + 1, n + 1);
+    W_.topLeftCorner(n, n) = design.B * design.Q * design.B.transpose();
+    C_                     = Eigen::MatrixXd::Zero(design.C.rows(), n + 1);
+    C_.leftCols(n)         = design.C;
+    R_                     = design.R;
     try {
         const Json &info = design.root.at("methods").at("joint").at("info");
-        sensors_         = pair_sensors(design, info.at("pairs").at(0));
-        eta_             = info.at("eta").at(0).get<double>();
+        if ((kind == Kind::strong_kalman) || (kind == Kind::central_kalman)) {
+            listen_to_all_pairs(info);
+        } else {
+            listen_to_first_pair(info);
+        }
     } catch (const Json::exception &) {
         throw InputError(design.path + ": methods.joint.info names no pairs or no eta");
     }
-    A_                      = Eigen::MatrixXd::Identity(n + 1, n + 1);
-    A_.topLeftCorner(n, n)  = design.A;
-    W_                      = Eigen::MatrixXd::Zero(n + 1, n + 1);
-    W_.topLeftCorner(n, n)  = design.B * design.Q * design.B.transpose();
-    W_(n, n)                = (kind == Kind::augmented) ? 2.0 * eta_ : 0.0;
-    C_                      = Eigen::MatrixXd::Zero(design.C.rows(), n + 1);
-    C_.leftCols(n)          = design.C;
-    C_(sensors_.front(), n) = 1.0;
     reset();
+}
+
+void Comparison::listen_to_first_pair(const Json &info)
+{
+    const auto  n    = static_cast<Eigen::Index>(design_->n);
+    const Json &pair = info.at("pairs").at(0);
+    sensors_         = {sensor_of(*design_, pair.at(0))};
+    for (const Json &name : pair.at(1)) {
+        sensors_.push_back(sensor_of(*design_, name));
+    }
+    eta_                    = info.at("eta").at(0).get<double>();
+    W_(n, n)                = (kind_ == Kind::augmented) ? 2.0 * eta_ : 0.0;
+    C_(sensors_.front(), n) = 1.0;
+}
+
+void Comparison::listen_to_all_pairs(const Json &info)
+{
+    std::set<Eigen::Index> found;
+    for (std::size_t i = 0U; i < info.at("pairs").size(); i++) {
+        const Json        &pair = info.at("pairs").at(i);
+        const Eigen::Index weak = sensor_of(*design_, pair.at(0));
+        if (kind_ == Kind::central_kalman) {
+            found.insert(weak);
+            R_(weak, weak) += info.at("eta").at(i).get<double>();
+        }
+        for (const Json &name : pair.at(1)) {
+            found.insert(sensor_of(*design_, name));
+        }
+    }
+    sensors_.assign(found.begin(), found.end());
 }
 
 const char *Comparison::name() const
@@ -57,9 +80,13 @@ const char *Comparison::name() const
     case Kind::augmented_blind:
         return "augmented_blind";
     case Kind::adaptive:
+        return "adaptive";
+    case Kind::strong_kalman:
+        return "strong_kalman";
+    case Kind::central_kalman:
         break;
     }
-    return "adaptive";
+    return "central_kalman";
 }
 
 void Comparison::reset()
@@ -104,7 +131,7 @@ void Comparison::step(const Eigen::VectorXd &u, const Eigen::VectorXd &y, blw_ma
 void Comparison::correct(const Eigen::VectorXd &y, const std::vector<Eigen::Index> &rows)
 {
     const Eigen::MatrixXd C = C_(rows, Eigen::all);
-    const Eigen::MatrixXd R = design_->R(rows, rows);
+    const Eigen::MatrixXd R = R_(rows, rows);
     const Eigen::VectorXd e = y(rows) - design_->offset(rows) - C * X_;
     const Eigen::MatrixXd S = C * P_ * C.transpose() + R;
     const Eigen::MatrixXd K = S.llt().solve(C * P_).transpose();

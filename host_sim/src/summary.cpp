@@ -176,17 +176,26 @@ void add_iterations(const MethodScores &scores, Json &out)
                          {"histogram", bars}};
 }
 
+void add_verdict(const std::string &method, const Design &design, Json &out)
+{
+    const Json::json_pointer where("/methods/" + method + "/info/verdict");
+    if (design.root.contains(where)) {
+        out["verdict"] = design.root.at(where);
+    }
+}
+
 } // namespace
 
-Json summarise(const std::vector<MethodScores> &scores, double dt_s)
+Json summarise(const std::vector<MethodScores> &scores, const Design &design)
 {
     Json methods = Json::object();
     for (const MethodScores &method : scores) {
         Json &out = methods[method.method];
         add_errors(method, scores.back(), out);
-        add_detection(method, dt_s, out);
+        add_detection(method, design.dt_s, out);
         add_outcomes(method, out);
         add_iterations(method, out);
+        add_verdict(method.method, design, out);
     }
     return methods;
 }

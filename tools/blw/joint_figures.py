@@ -54,7 +54,7 @@ def figures() -> dict[str, Any]:
     """All tables.  Raises StepFailed if the simulator cannot be built."""
     grid = model.load(MODEL)
     found = kalman.steady_state(grid.A, grid.C, grid.W, grid.R)
-    fused = {variant: simulate(grid, {"variant": variant}) for variant in VARIANTS}
+    fused = {variant: simulate(grid, {"variant": variant}, compare=True) for variant in VARIANTS}
     first = simulate(grid, {"pairs": names(grid, PAIRS[:1])}, compare=True)
     second = simulate(grid, {"pairs": names(grid, PAIRS[1:])})
     return {
@@ -98,6 +98,7 @@ def figure_4(grid: Model, P0: Array, fused: dict[str, Run], first: Run,
     """Mean squared error of the state, local and fused, and of the filters to compare with."""
     eta = np.ones(2)
     variance = np.array([WHITE, PULSE**2 / PERIOD])
+    both = fused["corrected"].mse
     computed = {}
     for variant in VARIANTS:
         step = analysis.transient(grid, PAIRS, P0, eta, variant == "printed")[-1]
@@ -108,9 +109,10 @@ def figure_4(grid: Model, P0: Array, fused: dict[str, Run], first: Run,
         ("local y2", local[1], second.mse["joint"]),
         *((f"fused, {variant}", computed[variant].fused, fused[variant].mse["joint"])
           for variant in VARIANTS),
-        ("strong Kalman", analysis.strong_filter(grid, (2, 3, 4)), None),
+        ("strong Kalman", analysis.strong_filter(grid, (2, 3, 4)), both["strong_kalman"]),
         ("central Kalman, eta", analysis.central_filter(grid, PAIRS, eta), None),
-        ("central Kalman", analysis.central_filter(grid, PAIRS, eta, variance), None),
+        ("central Kalman", analysis.central_filter(grid, PAIRS, eta, variance),
+         both["central_kalman"]),
         ("oracle", None, first.mse["oracle"]),
         ("kalman, undefended", None, first.mse["kalman"]),
     ]

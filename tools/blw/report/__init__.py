@@ -4,6 +4,7 @@
 from blw.report import panels_state  # noqa: F401, I001
 from blw.report import panels_decision  # noqa: F401
 from blw.report import panels_sensor  # noqa: F401
+from blw.report import panels_theta  # noqa: F401
 from blw.report import panels_signal  # noqa: F401
 from blw.report.command import report
 

@@ -35,10 +35,15 @@ METHOD_STYLES = {
     "bank": ("#e69f00", "-"),
     "guard": ("#d55e00", "-"),
     "sentry": ("#332288", (0, (6, 1.2))),
+    "augmented": ("#882255", (0, (3, 1))),
+    "augmented_blind": ("#c8659a", (0, (1, 1.5))),
+    "adaptive": ("#661100", (0, (5, 1, 1, 1))),
+    "strong_kalman": ("#117733", (0, (2, 1))),
+    "central_kalman": ("#44aa99", (0, (4, 2))),
 }
-LEGEND_ROW_IN, TITLE_IN, TIME_IN, LABELS_IN, RIGHT_IN = 0.2, 0.3, 0.44, 0.56, 0.12
+LEGEND_ROW_IN, TITLE_IN, TIME_IN, LABELS_IN, RIGHT_IN = 0.2, 0.3, 0.44, 0.56, 0.22
 STEPS = [1, 2, 2.5, 5, 10]
-SPARE_COLOURS = ("#882255", "#117733", "#661100", "#44aa99")
+SPARE_COLOURS = ("#999933", "#1f5f5b", "#7a4f9a", "#8a6d3b")
 
 RC = {
     "font.family": "DejaVu Sans",

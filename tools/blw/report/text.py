@@ -124,7 +124,8 @@ def subtitle(recording: Recording) -> str:
 
 def findings(recording: Recording, figures: dict[str, Figures]) -> list[str]:
     """What happened, in plain sentences made from the figures."""
-    told = [*_attack_sentences(recording), *_ratio_sentence(figures), *_alarm_sentence(figures)]
+    told = [*_attack_sentences(recording), *_ratio_sentence(figures), *_alarm_sentence(figures),
+            *_verdict_sentences(figures)]
     divergence = recording.summary.get("divergence")
     if divergence:
         where = f"run {divergence['run'] + 1} at step {divergence['k']}"
@@ -162,6 +163,12 @@ def _alarm_sentence(figures: dict[str, Figures]) -> list[str]:
     found = {name: row["attacks_detected"] for name, row in figures.items()}
     missed = [name for name, share in found.items() if share and share["count"] < share["of"]]
     return [f"Not every attack raised an alarm in {listed(missed)}."] if missed else []
+
+
+def _verdict_sentences(figures: dict[str, Figures]) -> list[str]:
+    """What the design found out about a method and wants its user to know."""
+    return [f"The design of {name} says: {row['verdict']}." for name, row in figures.items()
+            if row.get("verdict")]
 
 
 def caveats(recording: Recording) -> list[str]:
