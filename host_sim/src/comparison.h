@@ -49,7 +49,7 @@ private:
 
     const Design             *design_;
     Kind                      kind_;
-    std::vector<Eigen::Index> sensors_; /* those that it uses */
+    std::vector<Eigen::Index> sensors_;   /* those that it uses */
     double                    eta_ = 0.0; /* variance of theta(0); 0 if it stays 0 */
     Eigen::MatrixXd           A_, W_, C_; /* of the augmented system; C_ [m x (n + 1)] */
     Eigen::MatrixXd           R_;         /* [m x m] */
