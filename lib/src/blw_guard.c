@@ -31,6 +31,7 @@ static void bind(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *
     self->x_hat     = blw_la_take(&mem, n);
     self->d         = blw_la_take(&mem, n);
     self->step      = blw_la_take(&mem, (size_t)model->most * model->r);
+    self->turned    = blw_la_take(&mem, 3U * (size_t)model->r);
     self->L         = mem;
 }
 
@@ -93,25 +94,42 @@ static blw_real_t innovation(const blw_guard_t *self, size_t i, const blw_real_t
     return y_bar;
 }
 
+/* e_i = Lam_i eta_i + b_i nu; Lam_i by rows. */
+static void filter(const blw_guard_model_t *model, const blw_real_t *Lam, const blw_real_t *b,
+                   blw_real_t nu, const blw_real_t *eta, blw_real_t *e)
+{
+    const size_t r     = model->r;
+    const size_t reach = model->reach;
+
+    for (size_t a = 0U; a < r; a++) {
+        blw_real_t sum = BLW_R(0.0);
+
+        if (a < reach) {
+            sum = b[a] * nu;
+        }
+        for (size_t c = (a > reach) ? (a - reach) : 0U; c < r; c++) {
+            sum += *Lam * eta[c];
+            Lam++;
+        }
+        e[a] = sum;
+    }
+}
+
 /* (1) */
 static void advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   r     = model->r;
     const size_t                   m     = model->head.plant->m;
-    const blw_real_t              *b     = model->b;
+    const size_t                   size  = blw_guard_filter_len(model);
     blw_mask_t                     rest  = used;
-    size_t                         row   = 0U;
 
     for (size_t i = 0U; i < m; i++) {
         const blw_real_t nu = innovation(self, i, y, (rest & 1U) != 0U);
 
-        for (size_t a = 0U; a < r; a++) {
-            self->e[row + a] = b[row + a] * nu;
-        }
-        guard_mul(r, r, 0U, r, &model->Lam[row * r], &self->eta[row], &self->e[row]);
+        filter(model, &model->Lam[i * size], &model->b[i * model->reach], nu, &self->eta[i * r],
+               &self->e[i * r]);
         rest >>= 1;
-        row += r;
     }
 }
 
@@ -171,7 +189,7 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
             self->x_hat[j] = self->x_ref[j];
             self->d[j]     = -self->d[j];
         }
-        guard_mul_t(n_u, N, model->Gu, self->d, self->e, self->eta);
+        guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
         return;
     }
     blw_la_copy(n, self->x_bar, self->x_ref);
@@ -180,7 +198,7 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
     for (size_t j = 0U; j < n_u; j++) {
         self->d[j] = -self->d[j];
     }
-    guard_mul_t(n_u, N, model->Gu, self->d, self->e, self->eta);
+    guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
     blw_la_fill(n, BLW_R(0.0), self->d);
     guard_mul(n - n_u, N, 0U, N, model->Sig, self->l, self->d);
     blw_la_copy(n, self->x_ref, self->x_hat);

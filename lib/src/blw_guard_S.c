@@ -2,6 +2,7 @@
 /* Products with S, whose blocks below the diagonal are stored sensor by sensor in strips. */
 #include "blw_guard_internal.h"
 #include "blw_guard_strips.h"
+#include "blw_la.h"
 
 static const blw_real_t *rows_of(const blw_guard_model_t *model, size_t i)
 {
@@ -29,17 +30,36 @@ void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau
     }
 }
 
-void blw_guard_spread(const blw_guard_model_t *model, size_t i, const blw_real_t *step,
-                      blw_real_t *l)
+void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step)
 {
-    const size_t r = model->r;
-    const size_t m = model->head.plant->m;
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   r     = model->r;
+    const size_t                   m     = model->head.plant->m;
+    blw_real_t *const              tau   = &self->eta[i * r];
+    blw_real_t *const              l     = &self->l[i * r];
 
+    for (size_t a = 0U; a < model->rank[i]; a++) { /* S_ii = diag(I, 0) */
+        tau[a] += step[a];
+        l[a] += step[a];
+    }
     if (i > 0U) {
-        guard_mul_t(r, i * r, rows_of(model, i), step, l, l);
+        guard_mul_t(r, i * r, 0U, i * r, rows_of(model, i), step, self->l, self->l);
     }
     for (size_t j = i + 1U; j < m; j++) {
-        guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &l[j * r]);
+        guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &self->l[j * r]);
+    }
+}
+
+void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
+                      blw_real_t *y)
+{
+    const size_t r = model->r;
+
+    blw_la_fill(r, BLW_R(0.0), y);
+    if (j < i) {
+        guard_mul(r, i * r, j * r, r, rows_of(model, i), x, y);
+    } else {
+        guard_mul_t(r, j * r, i * r, r, rows_of(model, j), x, y, y);
     }
 }
 

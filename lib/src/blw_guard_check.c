@@ -6,9 +6,18 @@ static bool sizes_ok(const blw_guard_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
 
-    return (model->r >= 1U) && (model->n_u <= plant->n) && (model->n_units <= plant->m)
+    return (model->r >= 1U) && (model->reach >= 1U) && (model->reach <= model->r)
+           && (model->n_u <= plant->n) && (model->n_units <= plant->m)
            && (model->n_units > plant->p) && (model->most >= 1U) && (model->most <= plant->m)
-           && (model->search <= 1U) && (model->max_updates >= 1U);
+           && (model->search <= 1U) && (model->max_updates >= 1U) && (model->pairs <= 1U);
+}
+
+/* Pairs are for single sensors only. */
+static bool pairs_ok(const blw_guard_model_t *model)
+{
+    const blw_plant_t *const plant = model->head.plant;
+
+    return (model->pairs == 0U) || ((plant->p == 1U) && (model->n_units == plant->m));
 }
 
 /* Every unit has a number below n_units, no p units hold more than `most` sensors, every rank is
@@ -63,10 +72,13 @@ static void add_tables(const blw_guard_model_t *model, blw_table_check_t *check)
     const size_t N   = m * r;
     const size_t n_u = model->n_u;
     const size_t n_s = n - n_u;
+    const size_t len = (model->pairs != 0U) ? (N * (m - 1U)) : 0U;
 
-    blw_table_add(check, model->Lam, N * r);
-    blw_table_add(check, model->b, N);
+    blw_table_add(check, model->Lam, m * blw_guard_filter_len(model));
+    blw_table_add(check, model->b, m * model->reach);
     blw_table_add(check, model->S, (r * r * m * (m - 1U)) / 2U);
+    blw_table_add(check, model->V, len * r);
+    blw_table_add(check, model->s, len);
     blw_table_add(check, model->Fu, n_u * N);
     blw_table_add(check, model->Gu, n_u * N);
     blw_table_add(check, model->Xu, (n_s > 0U) ? (n * n_u) : 0U);
@@ -90,7 +102,7 @@ blw_status_t blw_guard_check(const blw_guard_model_t *model)
     if (status != BLW_OK) {
         return status;
     }
-    if (!sizes_ok(model) || !units_ok(model)) {
+    if (!sizes_ok(model) || !units_ok(model) || !pairs_ok(model)) {
         return BLW_ERR_MODEL;
     }
     add_tables(model, &check);

@@ -7,9 +7,11 @@
 
 /** l = S tau, every row. */
 void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau, blw_real_t *l);
-/** Add S_ji step to l_j for all sensors j but i. */
-void blw_guard_spread(const blw_guard_model_t *model, size_t i, const blw_real_t *step,
-                      blw_real_t *l);
+/** Add `step` [r] to tau_i, and S_ji step to l_j for all sensors j. */
+void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step);
+/** y = S_ij x, i /= j */
+void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
+                      blw_real_t *y);
 /** Copy row a of S_ij, i > j, to row [r]. */
 void blw_guard_row(const blw_guard_model_t *model, size_t i, size_t j, size_t a, blw_real_t *row);
 
@@ -33,6 +35,17 @@ void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x);
 /** One Newton step of (2) on the sensors of the set, at most model->most.  @return false with nothing
  *  changed if an attack would change sides, where the model of second order is of no use. */
 bool blw_guard_newton(blw_guard_t *self, blw_mask_t set);
+/** The minimum of (2) over nu_i and nu_j, where j is the one excluded sensor and l_j = 0. */
+void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j);
+
+/** Numbers of Lam_i: r^2 without the triangle below `reach` diagonals. */
+static inline size_t blw_guard_filter_len(const blw_guard_model_t *model)
+{
+    const size_t r = model->r;
+    const size_t d = r - model->reach;
+
+    return (r * r) - ((d * (d - 1U)) / 2U);
+}
 
 static inline bool guard_has(blw_mask_t mask, size_t i)
 {

@@ -170,10 +170,8 @@ bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
         }
         for (size_t a = 0U; a < r; a++) {
             step[a] = (a < model->rank[i]) ? -step[a] : BLW_R(0.0);
-            self->eta[(i * r) + a] += step[a];
-            self->l[(i * r) + a] += step[a];
         }
-        blw_guard_spread(model, i, step, self->l);
+        blw_guard_move(self, i, step);
         step += r;
     }
     self->attacked |= set;

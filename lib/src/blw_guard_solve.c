@@ -16,28 +16,28 @@
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
-/* Largest |step| that ends the descent, relative to k. */
-#define TOLERANCE (BLW_R(256.0) * BLW_REAL_EPS)
+/* Largest |step| that ends the descent, relative to k: eps^(2/3), about. */
+#define TOLERANCE ((BLW_REAL_EPS > BLW_R(1e-10)) ? BLW_R(3e-5) : BLW_R(3e-11))
 
-/* |e_i - tau_i| / k above which rounding in l would show. */
-#define GROSS BLW_R(32.0)
+/* |step| / k above which rounding in l would show. */
+#define GROSS BLW_R(64.0)
 
 /* Sensors may come up for another update so many times before Newton steps are tried. */
-#define PATIENCE 3U
+#define PATIENCE 2U
+
+/* The units to exclude are beyond doubt if no |h_i| is nearer to where it would matter than this
+ * many times the largest |step|. */
+#define CLEAR BLW_R(8.0)
 
 typedef struct descent {
     blw_real_t pending; /* sum over the sensors of effect_i |step_i| */
     blw_real_t largest; /* largest |step_i| */
     size_t     sensor;  /* whose it is */
-    bool       gross;   /* l holds the rounding of a gross attack */
-    bool       renewed; /* l has been computed again already */
+    unsigned   limit;   /* on self->updates */
     unsigned   repeats; /* updates of sensors that had had one */
+    bool       gross;   /* l may hold the rounding of a gross attack */
+    bool       decides; /* ends as soon as it is clear which units to exclude */
 } descent_t;
-
-static blw_real_t threshold_of(const blw_guard_t *self, size_t i)
-{
-    return guard_has(self->excluded, i) ? BLW_R(0.0) : self->model->k;
-}
 
 /* s of (7) from |h_i|. */
 static blw_real_t shrink(blw_real_t h, blw_real_t k)
@@ -45,25 +45,18 @@ static blw_real_t shrink(blw_real_t h, blw_real_t k)
     return (h > k) ? (k / h) : BLW_R(1.0);
 }
 
-/* |step| of (7) for sensor i; also notes |h_i|. */
-static blw_real_t step_length(blw_guard_t *self, size_t i)
+/* |step| of (7) for a sensor with nu_i /= 0 from its l, e and tau [r]; also |h_i|. */
+static blw_real_t attacked_step(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
+                                const blw_real_t *tau, blw_real_t *length)
 {
-    const size_t            r = self->model->r;
-    const blw_real_t *const l = &self->l[i * r];
+    blw_real_t sum = BLW_R(0.0);
 
-    if (!guard_has(self->attacked, i)) { /* h = l */
-        self->h[i] = blw_la_norm(r, l);
-        return blw_la_max(BLW_R(0.0), self->h[i] - threshold_of(self, i));
-    }
-    const blw_real_t *const e   = &self->e[i * r];
-    const blw_real_t *const tau = &self->eta[i * r];
-    blw_real_t              sum = BLW_R(0.0);
     for (size_t a = 0U; a < r; a++) {
         const blw_real_t h = l[a] + (e[a] - tau[a]);
         sum += h * h;
     }
-    self->h[i]         = blw_la_sqrt(sum);
-    const blw_real_t s = shrink(self->h[i], threshold_of(self, i));
+    *length            = blw_la_sqrt(sum);
+    const blw_real_t s = shrink(*length, k);
     sum                = BLW_R(0.0);
     for (size_t a = 0U; a < r; a++) {
         const blw_real_t step = (s * (l[a] + (e[a] - tau[a]))) - l[a];
@@ -72,18 +65,37 @@ static blw_real_t step_length(blw_guard_t *self, size_t i)
     return blw_la_sqrt(sum);
 }
 
+/* All |h_i|, and the largest step. */
 static void survey(blw_guard_t *self, descent_t *descent)
 {
+    const blw_guard_model_t *const model    = self->model;
+    const size_t                   r        = model->r;
+    const size_t                   m        = model->head.plant->m;
+    blw_mask_t                     attacked = self->attacked;
+    blw_mask_t                     excluded = self->excluded;
+    size_t                         row      = 0U;
+
     descent->pending = BLW_R(0.0);
     descent->largest = BLW_R(0.0);
-    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        const blw_real_t length = step_length(self, i);
+    for (size_t i = 0U; i < m; i++) {
+        const blw_real_t k      = ((excluded & 1U) != 0U) ? BLW_R(0.0) : model->k;
+        blw_real_t       length = BLW_R(0.0);
 
-        descent->pending += self->model->effect[i] * length;
+        if ((attacked & 1U) != 0U) {
+            length =
+                attacked_step(r, k, &self->l[row], &self->e[row], &self->eta[row], &self->h[i]);
+        } else { /* h = l */
+            self->h[i] = blw_la_norm(r, &self->l[row]);
+            length     = blw_la_max(BLW_R(0.0), self->h[i] - k);
+        }
+        descent->pending += model->effect[i] * length;
         if (length > descent->largest) {
             descent->largest = length;
             descent->sensor  = i;
         }
+        attacked >>= 1;
+        excluded >>= 1;
+        row += r;
     }
 }
 
@@ -91,143 +103,198 @@ static void survey(blw_guard_t *self, descent_t *descent)
 static void update_sensor(blw_guard_t *self, size_t i)
 {
     const size_t            r   = self->model->r;
+    const blw_real_t        k   = guard_has(self->excluded, i) ? BLW_R(0.0) : self->model->k;
+    const blw_real_t        s   = shrink(self->h[i], k);
     const blw_real_t *const e   = &self->e[i * r];
-    blw_real_t *const       l   = &self->l[i * r];
+    const blw_real_t *const l   = &self->l[i * r];
     blw_real_t *const       tau = &self->eta[i * r];
-    const blw_real_t        s   = shrink(self->h[i], threshold_of(self, i));
 
     for (size_t a = 0U; a < r; a++) {
-        const blw_real_t clipped = s * (l[a] + (e[a] - tau[a]));
-
-        self->step[a] = clipped - l[a];
-        l[a]          = clipped;
-        tau[a] += self->step[a];
+        self->step[a] = (s * (l[a] + (e[a] - tau[a]))) - l[a];
     }
+    blw_guard_move(self, i, self->step);
     self->attacked |= guard_bit(i);
-    if (!(self->h[i] > threshold_of(self, i))) {
+    if (!(self->h[i] > k)) {
         blw_la_copy(r, e, tau);
         self->attacked &= ~guard_bit(i);
-    }
-    blw_guard_spread(self->model, i, self->step, self->l);
-}
-
-/* Try a Newton step on all sensors of the support; if it is too large for L, or the step is not
- * within reach of the quadratic model, on the excluded ones alone, where it is exact.  @return
- * whether anything was done. */
-static bool update_jointly(blw_guard_t *self)
-{
-    const blw_mask_t support = self->attacked | self->excluded;
-    const bool       several = blw_mask_count(self->excluded) > 1U;
-
-    if ((blw_mask_count(support) > 1U) && (blw_mask_count(support) <= self->model->most)
-        && blw_guard_newton(self, support)) {
-        return true;
-    }
-    return several && blw_guard_newton(self, self->excluded);
-}
-
-static void update(blw_guard_t *self, descent_t *descent)
-{
-    const size_t i       = descent->sensor;
-    const bool   several = guard_has(self->excluded, i) && (blw_mask_count(self->excluded) > 1U);
-    bool         again   = false;
-
-    if (guard_has(self->attacked, i)) {
-        again = (descent->repeats >= PATIENCE);
-        descent->repeats++;
-    }
-    if (!((several || again) && update_jointly(self))) {
-        update_sensor(self, i);
     }
     self->updates++;
 }
 
-/* Descend until nothing moves or `limit` updates were made in this step.  @return what is
- * pending. */
-static blw_real_t descend(blw_guard_t *self, unsigned limit, bool *converged)
+/* Block updates that a joint step on some sensors counts as: its spreads, and its factorisation. */
+static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 {
-    const blw_real_t k       = self->model->k;
-    descent_t        descent = {.gross = false};
+    const unsigned sensors = blw_mask_count(set);
+    const unsigned rate    = 6U * self->model->head.plant->m;
 
-    for (;;) {
-        survey(self, &descent);
-        *converged = descent.largest <= (TOLERANCE * k);
-        if (*converged && descent.gross && !descent.renewed) {
-            blw_guard_multipliers(self->model, self->eta, self->l);
-            descent.renewed = true;
-            continue;
-        }
-        if (*converged || (self->updates >= limit)) {
-            return descent.pending;
-        }
-        descent.gross = descent.gross || (descent.largest > (GROSS * k));
-        update(self, &descent);
-    }
+    return (sensors <= 1U)
+               ? 1U
+               : (sensors + 1U + ((sensors * sensors * sensors * self->model->r) / rate));
 }
 
-/* The p units with the largest |h_i| above the threshold, as sensors. */
-static blw_mask_t choose_excluded(const blw_guard_t *self)
+/* Try a Newton step on a set of sensors.  @return whether anything was done. */
+static bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
+{
+    const unsigned cost = self->updates + cost_of(self, set);
+
+    if ((blw_mask_count(set) > self->model->most) || (cost > limit)
+        || !blw_guard_newton(self, set)) {
+        return false;
+    }
+    self->updates = (uint16_t)cost;
+    return true;
+}
+
+/* The one excluded sensor, if there are tables for it; else m. */
+static size_t excluded_one(const blw_guard_t *self)
+{
+    const size_t m     = self->model->head.plant->m;
+    size_t       found = m;
+
+    for (size_t i = 0U; (self->model->pairs != 0U) && (i < m); i++) {
+        found = guard_has(self->excluded, i) ? i : found;
+    }
+    return found;
+}
+
+/* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
+static bool update(blw_guard_t *self, descent_t *descent)
+{
+    const size_t     i       = descent->sensor;
+    const size_t     j       = excluded_one(self);
+    const blw_mask_t support = self->attacked | self->excluded;
+    const bool several = guard_has(self->excluded, i) && (blw_mask_count(self->excluded) > 1U);
+    const bool beside  = (j < self->model->head.plant->m) && (j != i);
+
+    if (guard_has(self->attacked, i)) {
+        descent->repeats++;
+    }
+    if (several || (descent->repeats > PATIENCE)) {
+        if (update_jointly(self, support, descent->limit)
+            || (several && update_jointly(self, self->excluded, descent->limit))) {
+            return true;
+        }
+    }
+    if ((self->updates + (beside ? 2U : 1U)) > descent->limit) {
+        return false;
+    }
+    if (beside) {
+        blw_guard_update_beside(self, i, j);
+        self->updates = (uint16_t)(self->updates + 2U);
+    } else {
+        update_sensor(self, i);
+    }
+    return true;
+}
+
+/* The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
+ * `margin` would not change the choice. */
+static blw_mask_t choose_excluded(const blw_guard_t *self, blw_real_t margin, bool *clear)
 {
     const blw_guard_model_t *const model  = self->model;
     const size_t                   m      = model->head.plant->m;
     blw_mask_t                     chosen = 0U;
+    blw_real_t                     last   = BLW_REAL_MAX;
 
-    for (size_t taken = 0U; taken < model->head.plant->p; taken++) {
-        blw_real_t largest = model->exclude;
-        size_t     sensor  = m;
+    *clear = true;
+    for (size_t taken = 0U; taken <= model->head.plant->p; taken++) {
+        blw_real_t largest = BLW_R(0.0);
+        size_t     sensor  = 0U;
 
         for (size_t i = 0U; i < m; i++) {
-            if (!guard_has(chosen, i) && (self->h[i] > largest)) {
+            if ((self->h[i] > largest) && !guard_has(chosen, i)) {
                 largest = self->h[i];
                 sensor  = i;
             }
         }
-        for (size_t i = 0U; (sensor < m) && (i < m); i++) {
+        if ((taken == model->head.plant->p) || !(largest > model->exclude)) {
+            *clear = *clear && (taken == model->head.plant->p) && ((last - largest) > margin);
+            break;
+        }
+        *clear = *clear && (largest > (model->exclude + margin));
+        last   = largest;
+        for (size_t i = 0U; i < m; i++) {
             chosen |= (model->unit[i] == model->unit[sensor]) ? guard_bit(i) : 0U;
         }
     }
     return chosen;
 }
 
-/* Updates that may have been made after the first and after the second descent of a step, the rest
- * being for what follows; one is kept back for l_I = 0, without which (8) would not hold. */
-static unsigned limit_of(const blw_guard_model_t *model, unsigned stage)
+/* Descend until nothing moves, the choice is clear, or the limit is reached.  @return whether
+ * nothing moves. */
+static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
 {
-    const unsigned most = model->max_updates;
+    const blw_real_t k       = self->model->k;
+    bool             clear   = false;
+    bool             renewed = false;
 
-    if (model->search != 0U) {
-        return (stage * most) / 4U;
+    descent->limit   = limit;
+    descent->repeats = 0U;
+    for (;;) {
+        survey(self, descent);
+        const bool still = descent->largest <= (TOLERANCE * k);
+        if (still && descent->gross && !renewed) {
+            blw_guard_multipliers(self->model, self->eta, self->l);
+            renewed = true;
+            continue;
+        }
+        if (!still && descent->decides && (self->updates > 0U)) {
+            (void)choose_excluded(self, CLEAR * descent->largest, &clear);
+        }
+        if (still || clear || !update(self, descent)) {
+            return still;
+        }
+        descent->gross = descent->gross || (descent->largest > (GROSS * k));
     }
-    return (most > (3U - stage)) ? (most - (3U - stage)) : 0U;
 }
 
-static blw_real_t descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit,
-                                  bool *converged)
+/* l_I = 0 for the excluded sensors I. */
+static void eliminate(blw_guard_t *self)
 {
-    self->excluded = set;
-    return descend(self, limit, converged);
-}
+    const size_t m = self->model->head.plant->m;
 
-/* Search all sets, and solve again from the start without the best one. */
-static blw_real_t descend_after_search(blw_guard_t *self, bool *converged)
-{
-    const size_t   N     = (size_t)self->model->head.plant->m * self->model->r;
-    const unsigned limit = (unsigned)self->model->max_updates - 1U;
-
-    blw_la_copy(N, self->e, self->eta);
-    blw_guard_multipliers(self->model, self->eta, self->l);
-    self->attacked = 0U;
-    return descend_without(self, blw_guard_search(self), limit, converged);
-}
-
-/* Make sure of l_I = 0 where the descent has been cut off. */
-static void finish(blw_guard_t *self)
-{
-    if ((self->excluded == 0U) || (self->updates >= self->model->max_updates)) {
+    if (blw_mask_count(self->excluded) > 1U) {
+        (void)blw_guard_newton(self, self->excluded);
+        self->updates = (uint16_t)(self->updates + cost_of(self, self->excluded));
         return;
     }
-    (void)blw_guard_newton(self, self->excluded);
-    self->updates++;
+    for (size_t i = 0U; i < m; i++) {
+        if (guard_has(self->excluded, i)) {
+            update_sensor(self, i);
+        }
+    }
+}
+
+/* Solve on without the sensors of a set.  After a gross attack its rounding is removed from l first:
+ * where tau_I starts makes no difference, so it starts from 0.  Unless pairs keep l_I = 0 all the
+ * time, the work for that is kept back, since (8) would not hold otherwise. */
+static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, descent_t *descent)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   r     = model->r;
+    const unsigned                 cost  = cost_of(self, set);
+    const unsigned                 kept  = (model->pairs != 0U) ? 0U : cost;
+
+    self->excluded = ((self->updates + cost) > limit) ? 0U : set;
+    if (self->excluded == 0U) {
+        return false;
+    }
+    for (size_t i = 0U; descent->gross && (i < model->head.plant->m); i++) {
+        if (guard_has(set, i)) {
+            blw_la_fill(r, BLW_R(0.0), &self->eta[i * r]);
+        }
+    }
+    if (descent->gross) {
+        blw_guard_multipliers(model, self->eta, self->l);
+    }
+    descent->gross   = false;
+    descent->decides = false;
+    eliminate(self);
+    const bool converged = descend(self, limit - kept, descent);
+    if (!converged && (kept > 0U)) {
+        eliminate(self);
+    }
+    return converged;
 }
 
 /* (9); BLW_REAL_MAX if there is none. */
@@ -268,21 +335,28 @@ blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
     const size_t                   N       = (size_t)model->head.plant->m * model->r;
-    blw_real_t                     pending = BLW_R(0.0);
+    const unsigned                 most    = model->max_updates;
+    const unsigned                 part    = (model->search != 0U) ? (most / 4U) : (most / 2U);
+    descent_t                      descent = {.decides = self->warm_up == 0U};
+    bool                           clear   = false;
 
     blw_la_copy(N, self->e, self->eta);
-    pending              = descend(self, limit_of(model, 1U), converged);
-    const blw_mask_t set = (self->warm_up > 0U) ? 0U : choose_excluded(self);
+    *converged           = descend(self, descent.decides ? part : most, &descent);
+    const blw_mask_t set = (self->warm_up > 0U) ? 0U : choose_excluded(self, BLW_R(0.0), &clear);
+    if ((set == 0U) && !*converged) {
+        descent.decides = false;
+        *converged      = descend(self, most, &descent);
+    }
     if (set != 0U) {
-        pending = descend_without(self, set, limit_of(model, 2U), converged);
+        *converged =
+            descend_without(self, set, (model->search != 0U) ? (most / 2U) : most, &descent);
     }
     const bool unexplained = (self->attacked & ~self->excluded) != 0U;
     if ((set != 0U) && unexplained && (model->search != 0U)) {
-        pending = descend_after_search(self, converged);
+        blw_la_copy(N, self->e, self->eta);
+        blw_guard_multipliers(model, self->eta, self->l);
+        self->attacked = 0U;
+        *converged     = descend_without(self, blw_guard_search(self), most, &descent);
     }
-    if (*converged) {
-        return pending;
-    }
-    finish(self);
-    return bound_of(self);
+    return *converged ? descent.pending : bound_of(self);
 }

@@ -88,21 +88,22 @@ static inline void guard_mul(size_t rows, size_t cols, size_t first, size_t coun
     }
 }
 
-/** to [cols] = from + M' x [rows], all columns; rows >= 1 */
-static inline void guard_mul_t(size_t rows, size_t cols, const blw_real_t *M, const blw_real_t *x,
-                               const blw_real_t *from, blw_real_t *to)
+/** to [count] = from + M' x [rows]; rows >= 1 */
+static inline void guard_mul_t(size_t rows, size_t cols, size_t first, size_t count,
+                               const blw_real_t *M, const blw_real_t *x, const blw_real_t *from,
+                               blw_real_t *to)
 {
     const blw_real_t *start = from;
     size_t            a     = 0U;
 
     for (; (a + 3U) <= rows; a += 3U) {
-        guard_mul_t_strip(3U, cols, &M[a * cols], &x[a], start, to);
+        guard_mul_t_strip(3U, count, &M[(a * cols) + (first * 3U)], &x[a], start, to);
         start = to;
     }
     if ((rows - a) == 2U) {
-        guard_mul_t_strip(2U, cols, &M[a * cols], &x[a], start, to);
+        guard_mul_t_strip(2U, count, &M[(a * cols) + (first * 2U)], &x[a], start, to);
     } else if ((rows - a) == 1U) {
-        guard_mul_t_strip(1U, cols, &M[a * cols], &x[a], start, to);
+        guard_mul_t_strip(1U, count, &M[(a * cols) + first], &x[a], start, to);
     } else {
         /* all rows are done */
     }

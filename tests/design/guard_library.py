@@ -15,7 +15,7 @@ from blw.tables import Struct
 
 LIB = Path(__file__).resolve().parents[2] / "lib"
 SOURCES = ("blw_la", "blw_model", "blw_step", "blw_guard", "blw_guard_check", "blw_guard_search",
-           "blw_guard_solve", "blw_guard_S")
+           "blw_guard_solve", "blw_guard_beside", "blw_guard_S")
 FLAGS = ["-std=c99", "-ffp-contract=off", "-O2", "-fPIC", "-shared"]
 METHOD_GUARD = 7
 
@@ -50,17 +50,19 @@ def layouts(real: type) -> dict[str, type]:
 
     class GuardModel(ct.Structure):
         _fields_ = ([("head", Head)]
-                    + [(k, byte) for k in ("r", "n_u", "n_units", "most", "search")]
+                    + [(k, byte) for k in ("r", "reach", "n_u", "n_units", "most", "search",
+                                         "pairs")]
                     + [(k, word) for k in ("max_updates", "warm_up")]
                     + [(k, ct.POINTER(word)) for k in ("unit", "rank")]
-                    + [(k, pointer) for k in ("Lam", "b", "S", "Fu", "Gu", "Xu", "Xs", "Sig",
-                                              "effect", "drift")]
+                    + [(k, pointer) for k in ("Lam", "b", "S", "V", "s", "Fu", "Gu", "Xu",
+                                              "Xs", "Sig", "effect", "drift")]
                     + [(k, real) for k in ("k", "exclude", "gain", "kappa", "omega", "sigma")])
 
     class Guard(ct.Structure):
         _fields_ = ([("ops", ct.c_void_p), ("model", ct.c_void_p)]
                     + [(k, pointer) for k in ("eta", "e", "l", "average", "h", "suspicion",
-                                              "x_bar", "x_ref", "x_hat", "d", "step", "L")]
+                                              "x_bar", "x_ref", "x_hat", "d", "step", "turned",
+                                              "L")]
                     + [(k, ct.c_uint64) for k in ("attacked", "excluded")]
                     + [(k, word) for k in ("updates", "warm_up")])
 
@@ -75,7 +77,7 @@ def layouts(real: type) -> dict[str, type]:
 
 def memory_numbers(n: int, m: int, r: int, most: int) -> int:
     """BLW_GUARD_MEM."""
-    return 4 * m * r + 2 * m + 4 * n + most * r * (most * r + 3) // 2
+    return 4 * m * r + 2 * m + 4 * n + 3 * r + most * r * (most * r + 3) // 2
 
 
 class GuardLibrary:

@@ -26,6 +26,10 @@ static const blw_real_t guard_Lam[3]  = {BLW_R(0.25), BLW_R(0.25), BLW_R(0.25)};
 static const blw_real_t guard_b[3]    = {(blw_real_t)GUARD_S, (blw_real_t)GUARD_S,
                                          (blw_real_t)GUARD_S};
 static const blw_real_t guard_S[3]    = {BLW_R(-0.5), BLW_R(-0.5), BLW_R(-0.5)};
+static const blw_real_t guard_V[6]    = {BLW_R(1.0), BLW_R(1.0), BLW_R(1.0),
+                                         BLW_R(1.0), BLW_R(1.0), BLW_R(1.0)};
+static const blw_real_t guard_s[6]    = {BLW_R(0.75), BLW_R(0.75), BLW_R(0.75),
+                                         BLW_R(0.75), BLW_R(0.75), BLW_R(0.75)};
 static const blw_real_t guard_Fu[3]   = {(blw_real_t)(1.0 / (6.0 * GUARD_S)),
                                          (blw_real_t)(1.0 / (6.0 * GUARD_S)),
                                          (blw_real_t)(1.0 / (6.0 * GUARD_S))};
@@ -45,6 +49,8 @@ static inline void guard_seal(guard_made_t *made)
     blw_table_add(&check, model->Lam, N * model->r);
     blw_table_add(&check, model->b, N);
     blw_table_add(&check, model->S, 3U * model->r * model->r);
+    blw_table_add(&check, model->V, (model->pairs != 0U) ? 6U : 0U);
+    blw_table_add(&check, model->s, (model->pairs != 0U) ? 6U : 0U);
     blw_table_add(&check, model->Fu, model->n_u * N);
     blw_table_add(&check, model->Gu, model->n_u * N);
     blw_table_add(&check, model->Xs, n_s);
@@ -68,15 +74,19 @@ static inline void guard_make(guard_made_t *made)
                         .method = (uint8_t)BLW_METHOD_GUARD,
                         .plant  = &made->kalman.plant},
         .r           = 1U,
+        .reach       = 1U,
         .n_u         = 1U,
         .n_units     = 3U,
         .most        = (uint8_t)GUARD_MOST,
+        .pairs       = 1U,
         .max_updates = 20U,
         .unit        = guard_unit,
         .rank        = guard_rank,
         .Lam         = guard_Lam,
         .b           = guard_b,
         .S           = guard_S,
+        .V           = guard_V,
+        .s           = guard_s,
         .Fu          = guard_Fu,
         .Gu          = guard_Gu,
         .effect      = guard_ones,

@@ -146,6 +146,7 @@ static void test_step_given_units_excludes_all_sensors_of_one(void)
 
     made.model.unit    = pairs;
     made.model.n_units = 2U;
+    made.model.pairs   = 0U;
     start();
     step(gross, 7U);
     TEST_ASSERT_EQUAL_HEX64(5U, out.excluded);

@@ -42,6 +42,12 @@ LONGEST_WARM_UP = 10_000
 DRIFT_GAIN = 1.0 / 32.0
 DRIFT_SIGMAS = 5.0
 
+#: Block updates per step and attacked unit, and where less than RARE_CLIPPING of the benign steps
+#: need none.
+UPDATES = 12
+UPDATES_IF_OFTEN = 100
+RARE_CLIPPING = 0.95
+
 #: Sensors beside the p excluded units that a Newton step has room for.
 NEWTON_RESERVE = 3
 
@@ -106,17 +112,18 @@ def choose_limits(
     if exclude < k:
         raise ModelError(f"method.{NAME}: exclude is {exclude:g}; it must be at least k = {k:g}")
     ratios = guard_fusion.ratios(fusion, model.units, model.p)
+    recovery = probability(samples, k)
     search = needs_search(model, ratios, newton_sensors(model) * bank.r)
     return Limits(
         k=k,
         exclude=exclude,
         search=search,
-        max_updates=options.max_updates or default_updates(model, search),
+        max_updates=options.max_updates or default_updates(model, search, recovery),
         warm_up=warm_up_steps(model, kalman, bank, fusion),
         figures={
             "k": k,
             "exclude": exclude,
-            "recovery_probability": probability(samples, k),
+            "recovery_probability": recovery,
             "k_for_recovery": {str(p): float(np.quantile(samples, p)) for p in (0.9, 0.99, 0.999)},
             "k_if_independent": guard_fusion.chi2_threshold(fusion, wanted),
             "ratio": ratios.tolist(),
@@ -127,17 +134,20 @@ def choose_limits(
 def struct(model: Model, bank: Filters, fusion: Fusion, limits: Limits) -> Struct:
     """Tables blw_guard_model_t."""
     sets = guard_fusion.unit_sets(model.units, model.p)
+    pairs = guard_order.pair_reals(model, bank.r) > 0
     return Struct("blw_guard_model_t", NAME, {
         "r": bank.r,
+        "reach": fusion.reach,
         "n_u": bank.split.n_u,
         "n_units": len(model.units),
         "most": newton_sensors(model),
         "search": int(limits.search),
+        "pairs": int(pairs),
         "max_updates": limits.max_updates,
         "warm_up": limits.warm_up,
         "unit": index(unit_numbers(model), "[m] the sensor's unit"),
         "rank": index(fusion.rank, "[m] ones in S_ii"),
-        **matrices(bank, fusion),
+        **matrices(bank, fusion, pairs),
         "effect": table(effects(bank, fusion), "[m] |d x_hat / d tau_i|_2"),
         "drift": table(drift_thresholds(model, bank, fusion), "[m] on |average of l_i|"),
         "k": real(limits.k),
@@ -177,9 +187,11 @@ def needs_search(model: Model, ratios: Array, rows: int) -> bool:
                 and (model.p > 1 or model.groups))
 
 
-def default_updates(model: Model, search: bool) -> int:
-    """Room for the hardest of the reference systems, and for a second solution after a search."""
-    return (80 if search else 40) * max(1, model.p)
+def default_updates(model: Model, search: bool, recovery: float) -> int:
+    """Room for the steps of an attack on p units; several times that where benign noise alone often
+    clips several sensors at once, and twice that where a second solution follows a search."""
+    each = UPDATES if recovery >= RARE_CLIPPING else UPDATES_IF_OFTEN
+    return (2 if search else 1) * each * max(1, model.p)
 
 
 def strips(M: Array) -> Array:
@@ -187,15 +199,25 @@ def strips(M: Array) -> Array:
     return np.concatenate([M[a : a + STRIP].T.ravel() for a in range(0, len(M), STRIP)] or [[]])
 
 
-def matrices(bank: Filters, fusion: Fusion) -> dict[str, Table | None]:
-    """The members Lam to Sig."""
+def rows_of(Lam: Array, reach: int) -> Array:
+    """Lam [r x r] by rows, each from `reach` columns left of the diagonal on; flat."""
+    return np.concatenate([row[max(0, a - reach) :] for a, row in enumerate(Lam)])
+
+
+def matrices(bank: Filters, fusion: Fusion, pairs: bool) -> dict[str, Table | None]:
+    """The members Lam to Sig; without pairs, no V and no s."""
     split, r = bank.split, bank.r
     below = [strips(fusion.S[fusion.rows(i), : i * r]) for i in range(1, bank.m)]
     N, n_u, n_s = bank.N, split.n_u, split.As.shape[0]
+    reach = fusion.reach
+    vectors, values = guard_fusion.excluded_spectra(fusion) if pairs else (np.zeros((0, 0)),) * 2
+    turned = [strips(V) for per_sensor in vectors for V in per_sensor]
     return {
-        "Lam": table(np.concatenate([strips(L) for L in fusion.Lam]), f"[{bank.m}][{r} x {r}]"),
-        "b": table(fusion.b, f"[{bank.m}][{r}]"),
+        "Lam": table(np.concatenate([rows_of(L, reach) for L in fusion.Lam]), "by rows, banded"),
+        "b": table(fusion.b[:, :reach], f"[{bank.m}][{reach}]"),
         "S": table(np.concatenate([*below, []]), "S below its diagonal, sensor by sensor"),
+        "V": table(np.concatenate([*turned, []]), "eigenvectors of S_ii without sensor j"),
+        "s": table(values, "eigenvalues of S_ii without sensor j"),
         "Fu": table(strips(fusion.Fu), f"[{n_u} x {N}]"),
         "Gu": table(strips(fusion.Gu.T), f"[{n_u} x {N}] transposed"),
         "Xu": table(split.Xu, "[n x n_u]") if n_s else None,

@@ -9,6 +9,10 @@ are the best linear estimate and its multipliers; l ~ N(0, S) without attack.  P
 T_i S_ii T_i' = diag(I, 0), the zeros being directions that no other sensor can check, and
 
     eta_i' = T_i'^-1 eta_i,   l_i' = T_i l_i,   S' = T S T',   Lam_i' = T_i'^-1 Lam T_i'.        (2)
+
+An orthogonal matrix is left free in T_i.  Where S_ii = I for all sensors it makes Lam_i' upper
+Hessenberg and b_i' a multiple of e_1: `reach` is the number of diagonals below the main one, and
+of entries of b_i', that need not be zero.
 """
 
 from dataclasses import dataclass
@@ -46,6 +50,7 @@ class Fusion:
     Gu: Array  #: [N x n_u]
     Sig: Array  #: [n_s x N]
     rank: list[int]  #: per sensor, of S_ii
+    reach: int  #: of Lam and b: 1, or r where some S_ii is singular
     W: Array  #: [N x N]
     T: Array  #: [m][r x r]
 
@@ -74,21 +79,29 @@ def fuse(filters: Filters) -> Fusion:
     ) if n_u else np.zeros((0, filters.N))
     m, r = filters.m, filters.r
     T, rank = zip(*(_normal(Z[s], filters.W[s, s]) for s in _spans(m, r)))
+    hessenberg = min(rank) == r
+    if hessenberg:
+        T = [_staircase(t, filters) for t in T]
     back = [np.linalg.inv(t).T for t in T]  # eta' = back eta
     per_sensor = scipy.linalg.block_diag(*T)
     inverse = scipy.linalg.block_diag(*back)
     Z = per_sensor @ Z
     for s, good in zip(_spans(m, r), rank):
         Z[s][good:] = 0.0
+    Lam = np.array([t @ filters.Lam @ np.linalg.inv(t) for t in back])
+    b = np.array([t @ filters.b for t in back])
+    if hessenberg:
+        Lam, b = np.triu(Lam, -1), np.where(np.arange(r) < 1, b, 0.0)
     return Fusion(
-        Lam=np.array([t @ filters.Lam @ np.linalg.inv(t) for t in back]),
-        b=np.array([t @ filters.b for t in back]),
+        Lam=Lam,
+        b=b,
         S=Z @ Z.T,
         Z=Z,
         Fu=Fu @ per_sensor.T,
         Gu=inverse @ filters.Gu,
         Sig=filters.Sig @ inverse.T,
         rank=list(rank),
+        reach=1 if hessenberg else r,
         W=inverse @ filters.W @ inverse.T,
         T=np.array(T),
     )
@@ -111,6 +124,29 @@ def _normal(Z: Array, W: Array) -> tuple[Array, int]:
     good = share > UNCHECKED
     T = (U / np.where(good, np.sqrt(np.where(good, share, 1.0)), 1.0)).T @ L.T
     return T, int(good.sum())
+
+
+def _staircase(T: Array, filters: Filters) -> Array:
+    """T_i turned such that Lam_i' is upper Hessenberg and b_i' a multiple of e_1."""
+    back = np.linalg.inv(T).T
+    b = back @ filters.b
+    Q = np.linalg.qr(b[:, None], mode="complete")[0]
+    _, H = scipy.linalg.hessenberg(Q.T @ back @ filters.Lam @ T.T @ Q, calc_q=True)
+    return (Q @ H).T @ T  # the first column of H is e_1
+
+
+def excluded_spectra(fusion: Fusion) -> tuple[Array, Array]:
+    """For sensors i and j /= i: eigenvectors [m][m-1][r x r], in rows, and eigenvalues [m][m-1][r]
+    of S_ii - S_ij S_ji, which is what is left of S_ii once sensor j is excluded."""
+    m, r = fusion.m, fusion.r
+    vectors, values = np.empty((m, m - 1, r, r)), np.empty((m, m - 1, r))
+    for i in range(m):
+        for at, j in enumerate(j for j in range(m) if j != i):
+            coupling = fusion.S[fusion.rows(i), fusion.rows(j)]
+            own = fusion.S[fusion.rows(i), fusion.rows(i)]
+            found, V = np.linalg.eigh(own - coupling @ coupling.T)
+            vectors[i, at], values[i, at] = V.T, np.clip(found, 0.0, 1.0)
+    return vectors, values
 
 
 def largest_multiplier(fusion: Fusion) -> Array:

@@ -15,6 +15,9 @@ Array = NDArray
 #: An order is suggested if tr P grows by no more than this.
 TOLERABLE = 0.01
 
+#: Largest size of the tables for one excluded sensor.
+PAIR_NUMBERS = 16_000
+
 #: Largest number of rows for which all orders are computed.
 CURVE_ROWS = 400
 
@@ -79,12 +82,22 @@ def sees_all(bank: Filters) -> bool:
     return bool(np.linalg.matrix_rank(scaled, tol=1e-9) == bank.split.n_u)
 
 
-def flash_reals(bank: Filters) -> int:
-    """Numbers in the tables of blw_guard_model_t."""
+def pair_reals(model: Model, r: int) -> int:
+    """Numbers in the tables for one excluded sensor, V and s.  None if units of several sensors, or
+    several of them, may be excluded, nor if they would be larger than PAIR_NUMBERS."""
+    numbers = model.m * (model.m - 1) * r * (r + 1)
+    wanted = model.p == 1 and len(model.units) == model.m and numbers <= PAIR_NUMBERS
+    return numbers if wanted else 0
+
+
+def flash_reals(model: Model, bank: Filters) -> int:
+    """Numbers in the tables of blw_guard_model_t, all directions being checked by other sensors."""
     N, r, m, n_u = bank.N, bank.r, bank.m, bank.split.n_u
     n, n_s = len(bank.split.Xu), len(bank.split.As)
     split = (n * n_u + n * n_s + n_s * N) if n_s else 0
-    return N * r + N + r * r * m * (m - 1) // 2 + 2 * n_u * N + split + 2 * m + 6
+    own = m * (r * r - (r - 1) * (r - 2) // 2 + 1)
+    coupling = r * r * m * (m - 1) // 2 + pair_reals(model, r)
+    return own + coupling + 2 * n_u * N + split + 2 * m + 6
 
 
 def curve(model: Model, poles: Array, bank: Filters) -> dict[str, Any]:
@@ -98,7 +111,7 @@ def curve(model: Model, poles: Array, bank: Filters) -> dict[str, Any]:
         if chosen.size != order or not sees_all(tried):
             continue
         rows.append({"order": order, "trace_P": trace_P(tried),
-                     "flash_bytes": 4 * flash_reals(tried)})
+                     "flash_bytes": 4 * flash_reals(model, tried)})
     if not rows:
         return {}
     least = min(row["trace_P"] for row in rows)

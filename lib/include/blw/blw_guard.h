@@ -15,9 +15,10 @@
  *  Certificate: if |l_i| <= k for all i at nu = 0, x_hat is exactly the Kalman estimate.  Else (3)
  *  is solved sensor by sensor, the largest change first: no step size, no factorisation.  Then the
  *  units (sensors, or groups that fall together) with |h_i| > exclude, at most p, the largest first,
- *  get k_i = 0 and (2) is solved on from there: their samples then have no influence at all.  If
- *  that leaves another sensor with nu_i /= 0, and the model asks for it, all sets I of p units are
- *  searched for the one whose removal explains most, l_I' S_II^-1 l_I.
+ *  get k_i = 0 and (2) is solved on from there: their samples then have no influence at all.  As
+ *  soon as it is beyond doubt which units these will be, the first descent ends.  If that leaves
+ *  another sensor with nu_i /= 0, and the model asks for it, all sets I of p units are searched for
+ *  the one whose removal explains most, l_I' S_II^-1 l_I.
  *
  *  A missing sample is replaced by its prediction from the last estimate.  docs/guard.md derives
  *  all of this; tools/blw/guard.py makes the tables.
@@ -35,32 +36,39 @@ extern "C" {
 typedef struct blw_guard_model {
     blw_model_t       head;
     uint8_t           r;           /**< local states per sensor, >= 1 */
+    uint8_t           reach;       /**< diagonals of Lam_i below the main one, and numbers of b_i,
+                                        1..r */
     uint8_t           n_u;         /**< modes fused securely, 0..n; n_s = n - n_u */
     uint8_t           n_units;     /**< units, p < n_units <= m */
     uint8_t           most;        /**< sensors that may move in one Newton step, those of
                                         the p largest units at least, >= 1 */
     uint8_t           search;      /**< 1: search the sets of p units when exclusion fails */
-    uint16_t          max_updates; /**< bound on block updates in one step, >= 1 */
+    uint8_t           pairs;       /**< 1: V and s are there; needs p = 1 and n_units = m */
+    uint16_t          max_updates; /**< bound on block updates in one step, >= 1; joint steps count
+                                        as several (blw_guard_solve.c) */
     uint16_t          warm_up;     /**< steps after reset without exclusion */
     const uint16_t   *unit;        /**< [m] the sensor's unit */
     const uint16_t   *rank;        /**< [m] ones in S_ii, the first of its diagonal */
-    const blw_real_t *Lam;         /**< [m][r x r] in strips */
-    const blw_real_t *b;           /**< [N], N = m r */
-    const blw_real_t *S;           /**< for i = 1..m-1 [r x i r] in strips: S below its diagonal */
-    const blw_real_t *Fu;          /**< [n_u x N] in strips; NULL if n_u = 0 */
-    const blw_real_t *Gu;          /**< [n_u x N] Gu' in strips; NULL if n_u = 0 */
-    const blw_real_t *Xu;          /**< [n x n_u]; NULL if n_u is 0 or n, where it is I */
-    const blw_real_t *Xs;          /**< [n x n_s]; NULL if n_s = 0 */
-    const blw_real_t *Sig;         /**< [n_s x N] in strips; NULL if n_s = 0 */
-    const blw_real_t *effect;      /**< [m] largest change of x_hat by a change of tau_i, |.|_2 */
-    const blw_real_t *drift;       /**< [m] largest benign |average of l_i|, > 0 */
-    blw_real_t        k;           /**< threshold on |l_i|, > 0 */
-    blw_real_t        exclude;     /**< threshold on |h_i|, >= k */
-    blw_real_t        gain;        /**< of the exponentially weighted average of l_i, (0, 1] */
-    blw_real_t        kappa;       /**< |Xu x| <= kappa sum_i |Gu_i x|, whatever p units are left
+    const blw_real_t *Lam;     /**< [m][r x r] by rows, each from `reach` left of the diagonal */
+    const blw_real_t *b;       /**< [m][reach], the rest of b_i is 0; N = m r */
+    const blw_real_t *S;       /**< for i = 1..m-1 [r x i r] in strips: S below its diagonal */
+    const blw_real_t *V;       /**< [m][m-1][r x r] in strips: for sensor i and every other j */
+    const blw_real_t *s;       /**< [m][m-1][r]  V'diag(s) V = S_ii - S_ij S_ji; NULL without
+                                        pairs, as V */
+    const blw_real_t *Fu;      /**< [n_u x N] in strips; NULL if n_u = 0 */
+    const blw_real_t *Gu;      /**< [n_u x N] Gu' in strips; NULL if n_u = 0 */
+    const blw_real_t *Xu;      /**< [n x n_u]; NULL if n_u is 0 or n, where it is I */
+    const blw_real_t *Xs;      /**< [n x n_s]; NULL if n_s = 0 */
+    const blw_real_t *Sig;     /**< [n_s x N] in strips; NULL if n_s = 0 */
+    const blw_real_t *effect;  /**< [m] largest change of x_hat by a change of tau_i, |.|_2 */
+    const blw_real_t *drift;   /**< [m] largest benign |average of l_i|, > 0 */
+    blw_real_t        k;       /**< threshold on |l_i|, > 0 */
+    blw_real_t        exclude; /**< threshold on |h_i|, >= k */
+    blw_real_t        gain;    /**< of the exponentially weighted average of l_i, (0, 1] */
+    blw_real_t        kappa;   /**< |Xu x| <= kappa sum_i |Gu_i x|, whatever p units are left
                                         out of the sum; 0 if there is no such number */
-    blw_real_t        omega; /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
-    blw_real_t        sigma; /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
+    blw_real_t        omega;   /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
+    blw_real_t        sigma;   /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
 } blw_guard_model_t;
 
 /** Estimator state.  The caller owns it; the members are private. */
@@ -78,6 +86,7 @@ typedef struct blw_guard {
     blw_real_t              *x_hat;     /* [n] */
     blw_real_t              *d;         /* [n] d_u, then x_s */
     blw_real_t              *step;      /* [most r] change of tau */
+    blw_real_t              *turned;    /* [3 r] of one sensor, in the coordinates of V */
     blw_real_t              *L;         /* packed lower: factor of a part of S */
     blw_mask_t               attacked;  /* sensors with nu_i /= 0 */
     blw_mask_t               excluded;  /* sensors with k_i = 0 */
@@ -88,6 +97,7 @@ typedef struct blw_guard {
 /** Number of blw_real_t that init() needs; most as in the model. */
 #define BLW_GUARD_MEM(n, m, r, most) \
     ((4U * (size_t)(m) * (size_t)(r)) + (2U * (size_t)(m)) + (4U * (size_t)(n)) \
+     + (3U * (size_t)(r)) \
      + (((size_t)(most) * (size_t)(r) * (((size_t)(most) * (size_t)(r)) + 3U)) / 2U))
 
 /** As blw_estimator_ops.init. */
