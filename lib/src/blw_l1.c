@@ -126,12 +126,17 @@ static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info
 }
 
 /* Take tau on A from the last solve: nu then absorbs what changed, and a group whose nu has turned
- * round or vanished is no candidate any more. */
-static void warm_start(blw_l1_t *self, const blw_real_t *zeta)
+ * round or vanished is no candidate any more.  A solve that was cut short has left nothing worth
+ * taking: then from nu = 0. */
+static void start(blw_l1_t *self, const blw_real_t *zeta)
 {
     const blw_l1_model_t *const m = self->model;
     size_t                      k = 0U;
 
+    if (!self->solved) {
+        blw_l1_support_clear(self, zeta);
+        return;
+    }
     for (size_t g = 0U; g < m->n_groups; g++) {
         for (size_t i = m->first[g]; (i < m->first[g + 1U]) && !blw_l1_in_support(self, g); i++) {
             self->tau[i] = zeta[i];
@@ -173,8 +178,9 @@ void blw_l1_reset(blw_l1_t *self)
 {
     blw_la_fill(self->model->N, BLW_R(0.0), self->tau);
     blw_la_fill(self->model->N, BLW_R(0.0), self->dir);
-    self->n_A  = 0U;
-    self->rows = 0U;
+    self->n_A    = 0U;
+    self->rows   = 0U;
+    self->solved = true;
 }
 
 void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw_l1_info_t *info)
@@ -194,9 +200,10 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     } else if (m->engine == (uint8_t)BLW_L1_ADMM) {
         blw_l1_admm(self, zeta, info);
     } else {
-        warm_start(self, zeta);
+        start(self, zeta);
         blw_l1_active_set(self, zeta, info);
     }
+    self->solved = info->converged;
     if (!info->converged) {
         report_gap(self, zeta, info);
     }

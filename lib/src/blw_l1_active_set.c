@@ -103,8 +103,10 @@ static size_t vanished_pair(const blw_l1_t *self, const blw_real_t *zeta, blw_re
     return found;
 }
 
-/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic, and
- * a pair that is carried past 0 turns the slope round at once. */
+/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic, a pair
+ * that is carried past 0 turns the slope round at once, and a step along a null direction of H may
+ * be of any length and sign.  A slope that is not a number is an overshoot; a point that is not
+ * known to be short of the minimum is never taken, so the objective cannot rise. */
 static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
 {
     const blw_real_t most = -SLOPE_LEFT * slope(self, zeta, BLW_R(0.0));
@@ -115,14 +117,17 @@ static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
     if ((at <= most) || (high <= BLW_R(0.0))) {
         return;
     }
-    for (size_t h = 0U; (h < BISECTIONS) && (blw_la_abs(at) > most); h++) {
+    for (size_t h = 0U; (h < BISECTIONS) && !(blw_la_abs(at) <= most); h++) {
         pass->alpha = BLW_R(0.5) * (low + high);
         at          = slope(self, zeta, pass->alpha);
-        if (at > BLW_R(0.0)) {
-            high = pass->alpha;
-        } else {
+        if (at <= BLW_R(0.0)) {
             low = pass->alpha;
+        } else {
+            high = pass->alpha;
         }
+    }
+    if (!(blw_la_abs(at) <= most)) {
+        pass->alpha = low;
     }
     pass->blocked = vanished_pair(self, zeta, pass->alpha);
 }

@@ -10,6 +10,10 @@
  * then runs along the null direction, far beyond where a group of A vanishes. */
 #define PIVOT_MIN (BLW_R(16.0) * BLW_REAL_EPS)
 
+/* Least square of a pivot that is formed as a difference of numbers near 1, and so is rounding
+ * below it. */
+#define PIVOT2_MIN (BLW_R(4.0) * BLW_REAL_EPS)
+
 static blw_real_t *row_of_L(const blw_l1_t *self, size_t k)
 {
     return &self->L[blw_la_packed_row(k)];
@@ -168,7 +172,7 @@ void blw_l1_support_factor(blw_l1_t *self, const blw_real_t *zeta)
         const blw_real_t diagonal = H[r];
         blw_la_solve_lower(r, self->L, H);
         const blw_real_t pivot2 = diagonal - blw_la_dot(r, H, H);
-        H[r]                    = blw_la_sqrt(blw_la_max(pivot2, PIVOT_MIN * PIVOT_MIN));
+        H[r]                    = blw_la_sqrt(blw_la_max(pivot2, PIVOT2_MIN));
     }
 }
 

@@ -19,8 +19,9 @@ using Vector = Eigen::VectorXd;
 class Problem
 {
 public:
-    // sizes: rows of every group, 1 or 2; n states.
-    Problem(unsigned seed, const std::vector<int> &sizes, int n, double threshold)
+    // sizes: rows of every group, 1 or 2; n states; least eigenvalue of W before scaling.
+    Problem(unsigned seed, const std::vector<int> &sizes, int n, double threshold,
+            double least = 0.02)
         : random_(seed), N_(0), n_(n), c_(static_cast<Eigen::Index>(sizes.size()))
     {
         first_.push_back(0);
@@ -30,7 +31,7 @@ public:
         }
         G_             = normal(N_, n);
         const Matrix X = normal(N_, N_);
-        W_             = X * X.transpose() / N_ + 0.02 * Matrix::Identity(N_, N_);
+        W_             = X * X.transpose() / N_ + least * Matrix::Identity(N_, N_);
         reduce();
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             c_(g) = threshold * (1.0 + 0.3 * std::abs(normal(1, 1)(0)));
@@ -90,6 +91,17 @@ public:
             }
         }
         return worst;
+    }
+
+    // The objective (2) at nu = zeta - tau.
+    double objective(const Vector &zeta, const Vector &tau) const
+    {
+        const Vector nu  = zeta - tau;
+        double       sum = 0.5 * (Z_.transpose() * tau).squaredNorm();
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            sum += c_(g) * nu.segment(first(g), size(g)).norm();
+        }
+        return sum;
     }
 
     blw_l1_model_t model(blw_l1_engine_t engine, int max_iterations) const

@@ -112,6 +112,24 @@ void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
     }
 }
 
+// Rows of Z that are nearly dependent and thresholds far below the attack: whatever the support, the
+// objective does not rise above where it starts, nu = 0.
+void check_descent(unsigned seed, const std::vector<int> &sizes, int n)
+{
+    for (const double least : {1e-3, 1e-5, 1e-10}) {
+        Problem problem(seed, sizes, n, 1e-3, least);
+        Solver  solver(problem, BLW_L1_ACTIVE_SET, 8 * problem.rows());
+        for (int k = 0; k < 40; ++k) {
+            const Vector zeta  = rounded(problem.sample((k % 4 == 3) ? 100.0 : 1.0));
+            const Vector x     = solver.solve(zeta);
+            const double start = problem.objective(zeta, zeta);
+            const double end   = problem.objective(zeta, solver.tau());
+            expect(x.allFinite(), "estimate is finite", seed, x.norm());
+            expect(end <= 1.01 * start, "objective does not rise", seed, end / start);
+        }
+    }
+}
+
 } // namespace
 
 int main()
@@ -124,6 +142,8 @@ int main()
         }
         check_problem(seed, mixed, 2 + int(seed % 2));
         check_problem(seed, std::vector<int>(3 + seed % 4, 2), 2);
+        check_descent(seed, std::vector<int>(12 + seed % 20, 1), 3);
+        check_descent(seed, std::vector<int>(6 + seed % 10, 2), 4);
     }
     std::printf("%d failures\n", failures);
     return (failures == 0) ? 0 : 1;

@@ -49,17 +49,18 @@ typedef struct blw_l1_model {
 /** Solver state: the support A found last, from which the next solve starts. */
 typedef struct blw_l1 {
     const blw_l1_model_t *model;
-    blw_real_t           *tau;  /* [N] zeta - nu */
-    blw_real_t           *l;    /* [N] multipliers (3) */
-    blw_real_t           *dir;  /* [N] nu_g / |nu_g| on A; scaled dual of ADMM while that runs */
-    blw_real_t           *step; /* [N] steps of tau, first rows of A, then unused */
-    blw_real_t           *z;    /* [d] Z' tau */
-    blw_real_t           *dz;   /* [d] Z' step */
-    blw_real_t           *L;    /* packed lower: L L' = Z_A Z_A', plus curvature of pairs */
-    blw_real_t           *A;    /* [n_groups] groups of the support in the order of L: small
+    blw_real_t           *tau;    /* [N] zeta - nu */
+    blw_real_t           *l;      /* [N] multipliers (3) */
+    blw_real_t           *dir;    /* [N] nu_g / |nu_g| on A; scaled dual of ADMM while that runs */
+    blw_real_t           *step;   /* [N] steps of tau, first rows of A, then unused */
+    blw_real_t           *z;      /* [d] Z' tau */
+    blw_real_t           *dz;     /* [d] Z' step */
+    blw_real_t           *L;      /* packed lower: L L' = Z_A Z_A', plus curvature of pairs */
+    blw_real_t           *A;      /* [n_groups] groups of the support in the order of L: small
                                      integers, exact in blw_real_t */
-    uint16_t              n_A;  /* groups in A */
-    uint16_t              rows; /* rows of the groups in A = order of L */
+    uint16_t              n_A;    /* groups in A */
+    uint16_t              rows;   /* rows of the groups in A = order of L */
+    bool                  solved; /* whether tau is the solution of the last problem */
 } blw_l1_t;
 
 typedef struct blw_l1_info {
