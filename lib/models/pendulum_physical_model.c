@@ -73,6 +73,48 @@ static const blw_real_t kalman_K[16] = {
     BLW_R(2.312792407992872),
 };
 
+/* x_hat from k-1 to k: 35 multiply-adds of 52, the rest are zeros */
+static bool kalman_step(const blw_real_t *u, const blw_real_t *y, blw_real_t *x_hat)
+{
+    const blw_real_t x0 = x_hat[0];
+    const blw_real_t x1 = x_hat[1];
+    const blw_real_t x2 = x_hat[2];
+    const blw_real_t x3 = x_hat[3];
+    const blw_real_t u0 = u[0];
+    const blw_real_t y0 = y[0];
+    const blw_real_t y1 = y[1];
+    const blw_real_t y2 = y[2];
+    const blw_real_t y3 = y[3];
+    const blw_real_t size2 = (x0 * x0) + (x1 * x1) + (x2 * x2) + (x3 * x3) + (u0 * u0) + (y0 * y0) +
+        (y1 * y1) + (y2 * y2) + (y3 * y3);
+
+    if (!(size2 <= BLW_R(97421940593231.88))) {
+        return false;
+    }
+    const blw_real_t p0 = (BLW_R(0.0) + x0 + (BLW_R(0.09999999999999999) * x1) -
+        (BLW_R(0.049805580518647995) * x2) - (BLW_R(0.0016494149014845052) * x3)) +
+        ((BLW_R(0.0050411010468697955) * u0));
+    const blw_real_t p1 = (BLW_R(0.0) + x1 - (BLW_R(1.0123285320690965) * x2) -
+        (BLW_R(0.04980558051864799) * x3)) + ((BLW_R(0.1016494149014845) * u0));
+    const blw_real_t p2 = (BLW_R(0.0) + (BLW_R(1.099611161037296) * x2) +
+        (BLW_R(0.10329882980296902) * x3)) + ((BLW_R(-0.005082202093739591) * u0));
+    const blw_real_t p3 = (BLW_R(0.0) + (BLW_R(2.0246570641381925) * x2) + (BLW_R(1.099611161037296)
+        * x3)) + ((BLW_R(-0.103298829802969) * u0));
+    const blw_real_t e0 = y0 - (p0);
+    const blw_real_t e1 = y1 - (p0);
+    const blw_real_t e2 = y2 - (p0);
+    const blw_real_t e3 = y3 - (p2);
+    x_hat[0] = p0 + (BLW_R(0.2715917051977309) * e0) + (BLW_R(0.2715917051977307) * e1) +
+        (BLW_R(0.2715917051977309) * e2) - (BLW_R(0.013110290456020435) * e3);
+    x_hat[1] = p1 + (BLW_R(0.3140046888229149) * e0) + (BLW_R(0.314004688822915) * e1) +
+        (BLW_R(0.314004688822915) * e2) - (BLW_R(0.8483942072788999) * e3);
+    x_hat[2] = p2 - (BLW_R(0.01311029045602045) * e0) - (BLW_R(0.013110290456020447) * e1) -
+        (BLW_R(0.01311029045602045) * e2) + (BLW_R(0.7295829256499732) * e3);
+    x_hat[3] = p3 - (BLW_R(0.1293337157415709) * e0) - (BLW_R(0.12933371574157088) * e1) -
+        (BLW_R(0.12933371574157093) * e2) + (BLW_R(2.312792407992872) * e3);
+    return true;
+}
+
 const blw_kalman_model_t blw_pendulum_physical_kalman = {
     .head = {
         .abi    = BLW_MODEL_ABI,
@@ -80,7 +122,8 @@ const blw_kalman_model_t blw_pendulum_physical_kalman = {
         .crc    = BLW_CRC(0x5889299cU, 0xc6d69250U),
         .plant  = &blw_pendulum_physical_plant,
     },
-    .K = kalman_K,
+    .K    = kalman_K,
+    .step = kalman_step,
 };
 
 /* [p (p + 1) / 2] L^-1, L L' = S, packed lower */
@@ -204,17 +247,79 @@ static const blw_real_t canonical_jordan_G[64] = {
     BLW_R(0.0), BLW_R(0.0), BLW_R(-1.608105851055794), BLW_R(28.935125100741736),
 };
 
+/* all local filters from k-1 to k: 48 multiply-adds */
+static void canonical_jordan_step(const blw_real_t *u, const blw_real_t *y, blw_real_t *zeta)
+{
+    const blw_real_t y0 = y[0];
+    const blw_real_t y1 = y[1];
+    const blw_real_t y2 = y[2];
+    const blw_real_t y3 = y[3];
+    blw_real_t z0 = (BLW_R(0.20882749327198386) * zeta[0]) + (BLW_R(149.45851451330546) * y0);
+    blw_real_t z1 = (BLW_R(0.32459601175007813) * zeta[1]) + (BLW_R(134.51636881252927) * y0);
+    blw_real_t z2 = (BLW_R(0.8083680614757877) * zeta[2]) + (BLW_R(16.439312371997662) * y0);
+    blw_real_t z3 = (BLW_R(0.9046890843120512) * zeta[3]) + (BLW_R(4.430474172671919) * y0);
+    blw_real_t z4 = (BLW_R(0.20882749327198386) * zeta[4]) + (BLW_R(149.45851451330546) * y1);
+    blw_real_t z5 = (BLW_R(0.32459601175007813) * zeta[5]) + (BLW_R(134.51636881252927) * y1);
+    blw_real_t z6 = (BLW_R(0.8083680614757877) * zeta[6]) + (BLW_R(16.439312371997662) * y1);
+    blw_real_t z7 = (BLW_R(0.9046890843120512) * zeta[7]) + (BLW_R(4.430474172671919) * y1);
+    blw_real_t z8 = (BLW_R(0.20882749327198386) * zeta[8]) + (BLW_R(149.45851451330546) * y2);
+    blw_real_t z9 = (BLW_R(0.32459601175007813) * zeta[9]) + (BLW_R(134.51636881252927) * y2);
+    blw_real_t z10 = (BLW_R(0.8083680614757877) * zeta[10]) + (BLW_R(16.439312371997662) * y2);
+    blw_real_t z11 = (BLW_R(0.9046890843120512) * zeta[11]) + (BLW_R(4.430474172671919) * y2);
+    blw_real_t z12 = (BLW_R(0.20882749327198386) * zeta[12]) + (BLW_R(148.37826089432542) * y3);
+    blw_real_t z13 = (BLW_R(0.32459601175007813) * zeta[13]) + (BLW_R(129.2415879347694) * y3);
+    blw_real_t z14 = (BLW_R(0.8083680614757877) * zeta[14]) + (BLW_R(52.620246523715615) * y3);
+    blw_real_t z15 = (BLW_R(0.9046890843120512) * zeta[15]) + (BLW_R(52.991686670303714) * y3);
+
+    if (u != NULL) {
+        const blw_real_t u0 = u[0];
+        z0 += (BLW_R(-0.31475198043001423) * u0);
+        z1 += (BLW_R(-0.6923617020134177) * u0);
+        z2 += (BLW_R(-1.1448081140421913) * u0);
+        z3 += (BLW_R(-1.9876620465918058) * u0);
+        z4 += (BLW_R(-0.31475198043001423) * u0);
+        z5 += (BLW_R(-0.6923617020134177) * u0);
+        z6 += (BLW_R(-1.1448081140421913) * u0);
+        z7 += (BLW_R(-1.9876620465918058) * u0);
+        z8 += (BLW_R(-0.31475198043001423) * u0);
+        z9 += (BLW_R(-0.6923617020134177) * u0);
+        z10 += (BLW_R(-1.1448081140421913) * u0);
+        z11 += (BLW_R(-1.9876620465918058) * u0);
+        z12 += (BLW_R(0.32576208868253503) * u0);
+        z13 += (BLW_R(0.721348085301928) * u0);
+        z14 += (BLW_R(-3.144504553910077) * u0);
+        z15 += (BLW_R(-2.711477383239336) * u0);
+    }
+    zeta[0] = z0;
+    zeta[1] = z1;
+    zeta[2] = z2;
+    zeta[3] = z3;
+    zeta[4] = z4;
+    zeta[5] = z5;
+    zeta[6] = z6;
+    zeta[7] = z7;
+    zeta[8] = z8;
+    zeta[9] = z9;
+    zeta[10] = z10;
+    zeta[11] = z11;
+    zeta[12] = z12;
+    zeta[13] = z13;
+    zeta[14] = z14;
+    zeta[15] = z15;
+}
+
 static const blw_jordan_model_t canonical_jordan = {
-    .r  = 4U,
-    .m  = 4U,
-    .l  = 1U,
-    .J0 = canonical_jordan_J0,
-    .J1 = canonical_jordan_J1,
-    .J2 = canonical_jordan_J2,
-    .Jm = canonical_jordan_Jm,
-    .b  = canonical_jordan_b,
-    .D  = canonical_jordan_D,
-    .G  = canonical_jordan_G,
+    .r    = 4U,
+    .m    = 4U,
+    .l    = 1U,
+    .J0   = canonical_jordan_J0,
+    .J1   = canonical_jordan_J1,
+    .J2   = canonical_jordan_J2,
+    .Jm   = canonical_jordan_Jm,
+    .b    = canonical_jordan_b,
+    .D    = canonical_jordan_D,
+    .G    = canonical_jordan_G,
+    .step = canonical_jordan_step,
 };
 
 /* [n_groups + 1] first row of each group, then N */

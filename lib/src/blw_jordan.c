@@ -68,6 +68,10 @@ void blw_jordan_step_sensor(const blw_jordan_model_t *model, size_t i, const blw
 void blw_jordan_step(const blw_jordan_model_t *model, const blw_real_t *u, const blw_real_t *y,
                      blw_real_t *zeta)
 {
+    if (model->step != NULL) {
+        model->step(u, y, zeta);
+        return;
+    }
     for (size_t i = 0U; i < model->m; i++) {
         blw_jordan_step_sensor(model, i, u, y[i], &zeta[i * model->r]);
     }

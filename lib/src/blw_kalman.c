@@ -35,6 +35,8 @@ blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model
     self->x_hat     = blw_la_take(&mem, plant->n);
     self->x_bar     = blw_la_take(&mem, plant->n);
     self->suspicion = blw_la_take(&mem, plant->m);
+    self->all       = BLW_MASK_ALL(plant->m);
+    self->calm      = false;
     return blw_kalman_reset(self, NULL);
 }
 
@@ -52,6 +54,24 @@ blw_status_t blw_kalman_reset(blw_kalman_t *self, const blw_real_t *x0)
     return BLW_OK;
 }
 
+/* The usual step: every sample is there and nothing is near a bound. */
+static bool quick_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
+                       blw_mask_t valid)
+{
+    const blw_kalman_kernel_t kernel  = self->model->step;
+    const bool                input   = (u != NULL) || (self->model->head.plant->l == 0U);
+    const bool                regular = input && (y != NULL) && (valid == self->all);
+
+    if ((kernel == NULL) || !regular || !kernel(u, y, self->x_hat)) {
+        return false;
+    }
+    if (!self->calm) {
+        blw_la_fill(self->model->head.plant->m, BLW_R(0.0), self->suspicion);
+        self->calm = true;
+    }
+    return true;
+}
+
 /* (2) with the samples in used only; the suspicion of the others is 1. */
 static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
 {
@@ -61,6 +81,7 @@ static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
 
     blw_la_copy(n, self->x_bar, self->x_hat);
     blw_la_fill(m, BLW_R(1.0), self->suspicion);
+    self->calm = (used == self->all);
     for (size_t i = 0U; i < m; i++) {
         if (((used >> i) & 1U) == 0U) {
             continue;
@@ -75,32 +96,52 @@ static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
     }
 }
 
+/* Step by the loops, checking everything.  *used: the samples taken in. */
+static blw_status_t checked_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
+                                 blw_mask_t valid, blw_mask_t *used)
+{
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+
+    if (status != BLW_OK) {
+        return status;
+    }
+    *used = blw_plant_screen(plant, y, valid);
+    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
+    correct(self, y, *used);
+    if (!blw_la_bounded(plant->n, self->x_hat)) {
+        *used = 0U; /* the samples would overflow the state: predict instead */
+        correct(self, y, *used);
+    }
+    return BLW_OK;
+}
+
 blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
                              blw_mask_t valid, blw_estimator_out_t *out)
 {
     if ((self == NULL) || (out == NULL)) {
         return BLW_ERR_ARG;
     }
-    const blw_plant_t *const plant  = self->model->head.plant;
-    const blw_status_t       status = blw_step_check(plant, u, y, valid);
-    if (status != BLW_OK) {
-        return status;
+    blw_mask_t used  = valid;
+    uint8_t    flags = 0U;
+    if (!quick_step(self, u, y, valid)) {
+        const blw_status_t status = checked_step(self, u, y, valid, &used);
+        if (status != BLW_OK) {
+            return status;
+        }
+        flags = blw_step_flags(self->model->head.plant, used, 0U);
     }
-    blw_mask_t used = blw_plant_screen(plant, y, valid);
-
-    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
-    correct(self, y, used);
-    if (!blw_la_bounded(plant->n, self->x_hat)) {
-        used = 0U; /* the samples would overflow the state: predict instead */
-        correct(self, y, used);
-    }
-    *out = (blw_estimator_out_t){
-        .x_hat     = self->x_hat,
-        .suspicion = self->suspicion,
-        .used      = used,
-        .outcome   = (uint8_t)BLW_OUTCOME_KALMAN,
-        .flags     = blw_step_flags(plant, used, 0U),
-    };
+    /* member by member: a compound literal would be cleared by memset first */
+    out->x_hat      = self->x_hat;
+    out->suspicion  = self->suspicion;
+    out->statistic  = BLW_R(0.0);
+    out->threshold  = BLW_R(0.0);
+    out->bound      = BLW_R(0.0);
+    out->excluded   = 0U;
+    out->used       = used;
+    out->iterations = 0U;
+    out->outcome    = (uint8_t)BLW_OUTCOME_KALMAN;
+    out->flags      = flags;
     return BLW_OK;
 }
 

@@ -10,13 +10,16 @@
 
 #ifdef BLW_REAL_DOUBLE
 #define BLW_LA_SQRT sqrt
+#define BLW_LA_ABS  fabs
 #else
 #define BLW_LA_SQRT sqrtf
+#define BLW_LA_ABS  fabsf
 #endif
 
+/** |a|: one instruction, not a call, on every target. */
 static inline blw_real_t blw_la_abs(blw_real_t a)
 {
-    return (a < BLW_R(0.0)) ? -a : a;
+    return BLW_LA_ABS(a);
 }
 
 /** The larger one; a if one of them is NaN. */

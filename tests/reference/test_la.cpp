@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Every kernel of blw_la against Eigen in double, for all sizes 1..5.
+// Every kernel of blw_la against Eigen in double, for all sizes 1..8.
 #include <Eigen/Dense>
 #include <limits>
 #include <random>
@@ -17,7 +17,7 @@ using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowM
 using Vector = Eigen::VectorXd;
 
 constexpr double      tolerance = 32.0 * static_cast<double>(BLW_REAL_EPS);
-constexpr std::size_t largest   = 5;
+constexpr std::size_t largest   = 8;
 constexpr blw_real_t  untouched = 77;
 
 std::mt19937 generator(20240229);

@@ -44,7 +44,8 @@ void support_kalman_make(support_kalman_t *made)
     made->plant      = plant_of_head;
     made->model.head = (blw_model_t){
         .abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_KALMAN, .plant = &made->plant};
-    made->model.K = K;
+    made->model.K    = K;
+    made->model.step = NULL;
     support_kalman_seal(made);
 }
 

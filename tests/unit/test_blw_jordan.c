@@ -112,6 +112,26 @@ static void test_step_given_every_order_yields_the_dense_product(void)
     }
 }
 
+static void marking_kernel(const blw_real_t *u, const blw_real_t *y, blw_real_t *zeta)
+{
+    zeta[0] = (u != NULL) ? u[0] : y[0];
+}
+
+static void test_step_given_a_kernel_leaves_all_to_it(void)
+{
+    const blw_real_t u[L] = {BLW_R(2.0), BLW_R(-0.5)};
+    const blw_real_t y[M] = {BLW_R(1.5), BLW_R(-4.0)};
+    blw_real_t       zeta[M * R_MAX];
+
+    model.step = marking_kernel;
+    fill(zeta, M * R_MAX, 9U);
+    blw_jordan_step(&model, u, y, zeta);
+    TEST_ASSERT_REAL_WITHIN(0.0, 2.0, zeta[0]);
+    blw_jordan_step(&model, NULL, y, zeta);
+    TEST_ASSERT_REAL_WITHIN(0.0, 1.5, zeta[0]);
+    TEST_ASSERT_REAL_WITHIN(0.0, some_number(10U), zeta[1]);
+}
+
 static void test_step_sensor_given_one_sensor_leaves_the_others_alone(void)
 {
     blw_real_t       zeta[M * R_MAX];
@@ -205,6 +225,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_step_given_every_order_yields_the_dense_product);
+    RUN_TEST(test_step_given_a_kernel_leaves_all_to_it);
     RUN_TEST(test_step_sensor_given_one_sensor_leaves_the_others_alone);
     RUN_TEST(test_reset_given_a_state_yields_its_image);
     RUN_TEST(test_check_given_sound_tables_adds_them_in_order_of_the_members);

@@ -66,6 +66,39 @@ static void test_step_given_all_samples_yields_hand_computed_estimate(void)
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 4.125, out.x_hat[0]); /* 2.25 + 11.25/6 */
 }
 
+/* Stands for a generated kernel: a mark that no loop would make, and a limit of its own. */
+static bool marking_kernel(const blw_real_t *input, const blw_real_t *samples, blw_real_t *x_hat)
+{
+    if (!(samples[0] <= BLW_R(100.0))) {
+        return false;
+    }
+    x_hat[0] = (input != NULL) ? BLW_R(77.0) : BLW_R(66.0);
+    return true;
+}
+
+static void test_step_given_a_kernel_leaves_it_the_usual_step_only(void)
+{
+    const blw_real_t far[3] = {BLW_R(101.0), BLW_R(8.0), BLW_R(6.0)};
+
+    made.model.step = marking_kernel;
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, y, 5U, &out)); /* a gap: by loops */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 4.0, out.x_hat[0]);
+    TEST_ASSERT_REAL_WITHIN(0.0, 1.0, out.suspicion[1]);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, y, 7U, &out));
+    TEST_ASSERT_REAL_WITHIN(0.0, 77.0, out.x_hat[0]);
+    TEST_ASSERT_REAL_WITHIN(0.0, 0.0, out.suspicion[1]);
+    TEST_ASSERT_EQUAL_HEX64(7U, out.used);
+    TEST_ASSERT_EQUAL_HEX8(0U, out.flags);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, far, 7U, &out)); /* refused */
+    TEST_ASSERT_REAL_WITHIN(100.0 * SUPPORT_TOL, 39.5 - (9.5 / 6.0), out.x_hat[0]);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, NULL, y, 7U, &out)); /* u may matter */
+    TEST_ASSERT_TRUE(out.x_hat[0] < BLW_R(60.0));
+    made.plant.l = 0U;
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, NULL, y, 7U, &out));
+    TEST_ASSERT_REAL_WITHIN(0.0, 66.0, out.x_hat[0]);
+    TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_kalman_step(&filter, NULL, NULL, 7U, &out));
+}
+
 static void test_step_given_a_gap_or_bad_number_leaves_that_innovation_out(void)
 {
     const blw_real_t bad[3] = {support_nan, support_inf, BLW_REAL_MAX};
@@ -191,6 +224,7 @@ int main(void)
     RUN_TEST(test_init_given_null_or_little_memory_refuses);
     RUN_TEST(test_init_given_a_bad_model_refuses);
     RUN_TEST(test_step_given_all_samples_yields_hand_computed_estimate);
+    RUN_TEST(test_step_given_a_kernel_leaves_it_the_usual_step_only);
     RUN_TEST(test_step_given_a_gap_or_bad_number_leaves_that_innovation_out);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);
     RUN_TEST(test_step_given_wrong_arguments_leaves_state_and_out_untouched);

@@ -8,15 +8,13 @@ One pair of files serves both widths of blw_real_t: every number is written BLW_
 import textwrap
 import zlib
 from collections.abc import Iterable
-from decimal import Decimal
 from pathlib import Path
-
-import numpy as np
 
 from blw import names
 from blw.design import Design, Designed
+from blw.literals import literal
 from blw.model import Model
-from blw.tables import Index, Member, Real, Struct, Table
+from blw.tables import Code, Index, Member, Real, Struct, Table
 
 WIDTH = 100
 INDENT = "    "
@@ -77,24 +75,6 @@ def checksum(structs: Iterable[Struct], dtype: str) -> int:
         for values in struct.reals():
             crc = zlib.crc32(values.astype(dtype).tobytes(), crc)
     return crc
-
-
-def literal(x: float) -> str:
-    """A C decimal that is x as double and the float next to x as float, in 17 digits or fewer.
-
-    A compiler rounds the decimal to float at once, whereas the checksum rounds the double.  The two
-    differ only if x lies half-way between two floats and its decimal does not; then all digits.
-    """
-    text = f"{Decimal(x):e}" if _half_way(x) else repr(float(x))
-    return text if any(mark in text for mark in ".e") else text + ".0"
-
-
-def _half_way(x: float) -> bool:
-    near = np.float32(x)
-    if float(near) == x:
-        return False
-    other = np.nextafter(near, np.float32(np.inf if x > float(near) else -np.inf))
-    return abs(x - float(near)) == abs(x - float(other))
 
 
 def _origin(model: Model) -> str:
@@ -197,6 +177,8 @@ def _pointed_to(struct: Struct, path: str) -> list[str]:
         target = f"{path}_{name}"
         if isinstance(value, (Table, Index)):
             lines += _array(value, target)
+        elif isinstance(value, Code):
+            lines += _function(value, target)
         elif isinstance(value, Struct):
             lines += [*_object(value, f"static const {value.ctype} {target}", target, []), ""]
         elif isinstance(value, list):
@@ -226,11 +208,19 @@ def _value(value: Member, target: str) -> str:
         return "NULL"
     if isinstance(value, Struct):
         return f"&{target}"
-    if isinstance(value, (Table, Index, list)):
+    if isinstance(value, (Table, Index, Code, list)):
         return target
     if isinstance(value, Real):
         return f"BLW_R({literal(value.value)})"
     return f"{int(value)}U" if value >= 0 else str(int(value))
+
+
+def _function(code: Code, name: str) -> list[str]:
+    comment = textwrap.wrap(_plain(code.comment), WIDTH - 6)
+    lines = [("/* " if i == 0 else "   ") + line for i, line in enumerate(comment)]
+    lines[-1] += " */"
+    body = [INDENT + line if line else "" for line in code.body]
+    return [*lines, f"static {code.result} {name}({code.parameters})", "{", *body, "}", ""]
 
 
 def _array(value: Table | Index, name: str) -> list[str]:

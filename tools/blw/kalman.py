@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, matrix_balance, solve_discrete_are
 
-from blw import chi2
+from blw import chi2, straight
 from blw.design import Designed
 from blw.errors import DesignError
 from blw.model import Model
@@ -108,7 +108,8 @@ def mode_text(z: complex) -> str:
 def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables of blw_kalman_model_t, and a detector on the filter's innovations."""
     tables = Struct("blw_kalman_model_t", NAME,
-                    {"K": table(kalman.K, "[n x m] steady-state gain")}, method=NAME)
+                    {"K": table(kalman.K, "[n x m] steady-state gain"),
+                     "step": straight.kalman_step(model, kalman)}, method=NAME)
     S = model.C @ kalman.Pp @ model.C.T + model.R
     info = {
         "trace_P": float(np.trace(kalman.P)),

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import admm_tuning, l1
+from blw import admm_tuning, l1, straight
 from blw.design import Designed
 from blw.errors import ModelError
 from blw.kalman import Kalman
@@ -172,6 +172,7 @@ def jordan_struct(suffix: str, filters: LocalFilters, scale: Array, model: Model
     """Tables blw_jordan_model_t; scale [m r] is constant over every Jordan block of a sensor."""
     r, J = filters.r, filters.form.J
     m, l = model.m, model.l
+    b, D = scale * np.tile(filters.form.b, m), scale[:, None] * filters.D
 
     def diagonal(offset: int) -> Array:
         band = np.zeros(r)
@@ -190,9 +191,10 @@ def jordan_struct(suffix: str, filters: LocalFilters, scale: Array, model: Model
             "J1": table(diagonal(1), "[r] J(i, i+1)"),
             "J2": table(diagonal(2), "[r] J(i, i+2)"),
             "Jm": table(diagonal(-1), "[r] J(i, i-1)"),
-            "b": table(scale * np.tile(filters.form.b, m), f"[{m} {r}] input vectors"),
-            "D": table(scale[:, None] * filters.D, f"[{m} {r} x {l}] known inputs"),
+            "b": table(b, f"[{m} {r}] input vectors"),
+            "D": table(D, f"[{m} {r} x {l}] known inputs"),
             "G": table(scale[:, None] * filters.G, f"[{m} {r} x {model.n}] zeta = G x"),
+            "step": straight.jordan_step(J, b, D),
         },
     )
 

@@ -9,6 +9,7 @@ A Struct stands for one const C object.  Its members, in the order of the C decl
     index(array)    a pointer to a const integer table
     Struct          a pointer to a const object
     [Struct, ...]   a pointer to a const array of objects of one type
+    Code            a pointer to a function written for this design; C source only, NULL in JSON
     None            NULL
 
 Numbers below the smallest normal float32 in magnitude are stored as zero, so that one table serves
@@ -52,6 +53,16 @@ class Index:
     ctype: str = "uint16_t"
 
 
+@dataclass(frozen=True, eq=False)
+class Code:
+    """A static C function: result and parameters of its type, lines of its body."""
+
+    result: str
+    parameters: str
+    body: tuple[str, ...]
+    comment: str
+
+
 def real(x: float) -> Real:
     """A scalar blw_real_t member."""
     return Real(float(_flush(np.asarray(x, dtype=float))))
@@ -75,7 +86,7 @@ def index(array: ArrayLike, comment: str = "", ctype: str = "uint16_t") -> Index
     return Index(values.astype(np.int64), comment, ctype)
 
 
-Member = Union[int, Real, Table, Index, None, "Struct", list["Struct"]]
+Member = Union[int, Real, Table, Index, Code, None, "Struct", list["Struct"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +142,7 @@ def _member_json(value: Member) -> Any:
         return value.value
     if isinstance(value, (Table, Index)):
         return value.array.ravel().tolist()
-    return None if value is None else int(value)
+    return None if value is None or isinstance(value, Code) else int(value)
 
 
 def _walk(path: str, value: Member) -> Iterator[tuple[str, NDArray[np.float64]]]:

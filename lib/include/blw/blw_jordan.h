@@ -16,17 +16,23 @@
 extern "C" {
 #endif
 
+/** (1) for all sensors as straight-line code that the design tool writes: zeta [m r] with u [l] or
+ *  NULL and y [m] without offset.  The same numbers as the loops of blw_jordan_step(); only the sign
+ *  of a zero may differ, which no sum over zeta that starts from +0 lets through. */
+typedef void (*blw_jordan_kernel_t)(const blw_real_t *u, const blw_real_t *y, blw_real_t *zeta);
+
 typedef struct blw_jordan_model {
-    uint8_t           r;  /**< local states per sensor, >= 1 */
-    uint8_t           m;  /**< sensors */
-    uint8_t           l;  /**< known inputs */
-    const blw_real_t *J0; /**< [r] diagonal of J */
-    const blw_real_t *J1; /**< [r] J(i, i+1), 0 in the last row */
-    const blw_real_t *J2; /**< [r] J(i, i+2): chains of complex pairs; 0 in the last two rows */
-    const blw_real_t *Jm; /**< [r] J(i, i-1), 0 in the first row */
-    const blw_real_t *b;  /**< [m r] */
-    const blw_real_t *D;  /**< [m r x l], NULL if l = 0 */
-    const blw_real_t *G;  /**< [m r x n] zeta = G x without noise */
+    uint8_t             r;    /**< local states per sensor, >= 1 */
+    uint8_t             m;    /**< sensors */
+    uint8_t             l;    /**< known inputs */
+    const blw_real_t   *J0;   /**< [r] diagonal of J */
+    const blw_real_t   *J1;   /**< [r] J(i, i+1), 0 in the last row */
+    const blw_real_t   *J2;   /**< [r] J(i, i+2): chains of complex pairs; 0 in the last two rows */
+    const blw_real_t   *Jm;   /**< [r] J(i, i-1), 0 in the first row */
+    const blw_real_t   *b;    /**< [m r] */
+    const blw_real_t   *D;    /**< [m r x l], NULL if l = 0 */
+    const blw_real_t   *G;    /**< [m r x n] zeta = G x without noise */
+    blw_jordan_kernel_t step; /**< straight-line code for all filters; may be NULL */
 } blw_jordan_model_t;
 
 /** Add the tables to a walk and check the dimensions against the plant. */

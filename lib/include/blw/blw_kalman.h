@@ -14,9 +14,16 @@
 extern "C" {
 #endif
 
+/** (1) and (2) for one plant as straight-line code that the design tool writes: x_hat [n] from k-1 to
+ *  k with u [l] and all of y [m], the same bits as the loops of blw_kalman_step().
+ *  @return false with x_hat untouched unless u, x_hat and y are so small that no bound and no range
+ *  can be exceeded, which also refuses NaN. */
+typedef bool (*blw_kalman_kernel_t)(const blw_real_t *u, const blw_real_t *y, blw_real_t *x_hat);
+
 typedef struct blw_kalman_model {
-    blw_model_t       head;
-    const blw_real_t *K; /**< [n x m] steady-state gain */
+    blw_model_t         head;
+    const blw_real_t   *K;    /**< [n x m] steady-state gain */
+    blw_kalman_kernel_t step; /**< straight-line code for the usual step; may be NULL */
 } blw_kalman_model_t;
 
 /** Filter state.  The caller owns it; the members are private. */
@@ -26,6 +33,8 @@ typedef struct blw_kalman {
     blw_real_t               *x_hat;     /* [n] */
     blw_real_t               *x_bar;     /* [n] */
     blw_real_t               *suspicion; /* [m] */
+    blw_mask_t                all;       /* every sensor */
+    bool                      calm;      /* suspicion is all 0 */
 } blw_kalman_t;
 
 /** Number of blw_real_t that init() needs. */

@@ -54,7 +54,8 @@ def _layout(ctype: str) -> tuple[int, int]:
     offset, widest = 0, 1
     for declaration in filter(None, map(str.strip, _structs()[ctype].split(";"))):
         kind, star, _, count = _MEMBER.match(" ".join(declaration.split())).groups()
-        size, alignment = (POINTER, POINTER) if star else _layout(kind)
+        pointer = star or kind.endswith("_kernel_t")
+        size, alignment = (POINTER, POINTER) if pointer else _layout(kind)
         offset = -(-offset // alignment) * alignment + size * (macro(count)() if count else 1)
         widest = max(widest, alignment)
     return -(-offset // widest) * widest, widest

@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: MIT
+"""Straight-line C for the steps whose every number is known at design time.
+
+The functions do what the loops of the library do, in the same order of summation, without loop,
+index or table: zeros are left out and factors of one are not multiplied.  That changes no bit: a
+sum that starts from +0 is never -0, so a term of +-0 does not matter.  The numbers are written in,
+so that the compiler places them next to the code.
+"""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blw.design import plant_tables
+from blw.literals import literal
+from blw.model import Model
+from blw.tables import FLOAT32, Code
+
+if TYPE_CHECKING:
+    from blw.kalman import Kalman
+
+Array = NDArray[np.float64]
+
+#: Longest function, in multiply-adds: beyond, the loops cost little more and far less flash.
+MOST_TERMS = 256
+
+#: blw_real_t is float: bounds of the library, with room for rounding.
+SIGNAL_LIMIT = 1e14
+RANGE_LIMIT = 0.99
+
+WIDTH = 96
+
+
+def kalman_step(model: Model, kalman: "Kalman") -> Code | None:
+    """blw_kalman_kernel_t of a plant, or None where loops serve it better."""
+    n, m, l = model.n, model.m, model.l
+    terms = n * (n + l + 2 * m)
+    limit = _quick_limit(model, kalman)
+    if terms > MOST_TERMS or limit is None:
+        return None
+    A, Bu, C, K = (_flushed(matrix) for matrix in (model.A, model.Bu, model.C, kalman.K))
+    offset = _flushed(model.offset)
+    x, u, y = _names("x", n), _names("u", l), _names("y", m)
+    lines = [*_loads("x_hat", x), *_loads("u", u), *_loads("y", y)]
+    squares = " + ".join(f"({v} * {v})" for v in (*x, *u, *y))
+    lines += _statement("const blw_real_t size2 =", f"{squares};")
+    lines += ["", f"if (!(size2 <= {_real(limit**2)})) {{", "    return false;", "}"]
+    for i in range(n):
+        terms_u = _sum(Bu[i], u) if l else ""
+        known = f" + ({terms_u})" if terms_u else ""
+        lines += _statement(f"const blw_real_t p{i} =",
+                            f"(BLW_R(0.0){_tail(A[i], x)}){known};")
+    for i in range(m):
+        sample = f"(y{i}{_tail(-offset[i:i + 1], ['1'])})" if offset[i] else f"y{i}"
+        expected = _sum(C[i], _names("p", n))
+        lines += _statement(f"const blw_real_t e{i} =",
+                            f"{sample} - ({expected});" if expected else f"{sample};")
+    for j in range(n):
+        lines += _statement(f"x_hat[{j}] =", f"p{j}{_tail(K[j], _names('e', m))};")
+    lines.append("return true;")
+    comment = (f"x_hat from k-1 to k: {_count(A, Bu, C, K)} multiply-adds of {terms}, the rest are "
+               "zeros")
+    unused = [] if l else ["(void)u;"]
+    return Code("bool", "const blw_real_t *u, const blw_real_t *y, blw_real_t *x_hat",
+                tuple(unused + lines), comment)
+
+
+def jordan_step(J: Array, b: Array, D: Array) -> Code | None:
+    """blw_jordan_kernel_t for J [r x r], b [m r] and D [m r x l], or None if too long."""
+    r, (N, l) = len(J), D.shape
+    if N * (2 + l) > MOST_TERMS:
+        return None
+    J, b, D = _flushed(J), _flushed(b), _flushed(D)
+    z, y, u = _names("z", N), _names("y", N // r), _names("u", l)
+    bands = (0, 1, 2, -1)  # the order of the sum in blw_jordan_step_sensor()
+    state = [f"zeta[{i}]" for i in range(N)]
+    lines = [*_loads("y", y)]
+    for i in range(N):
+        row, start = i % r, i - i % r
+        at = [row + band for band in bands if 0 <= row + band < r]
+        factors = np.append(J[row, at], b[i])
+        value = _sum(factors, [*(state[start + column] for column in at), y[i // r]])
+        lines += _statement(f"blw_real_t {z[i]} =", f"{value or 'BLW_R(0.0)'};")
+    if l:
+        lines += ["", "if (u != NULL) {", *(f"    {line}" for line in _loads("u", u))]
+        for i in range(N):
+            if value := _sum(D[i], u):
+                lines += [f"    {line}" for line in _statement(f"{z[i]} +=", f"{value};")]
+        lines.append("}")
+    lines += [f"{state[i]} = {z[i]};" for i in range(N)]
+    unused = [] if l else ["(void)u;"]
+    comment = f"all local filters from k-1 to k: {_count(np.tile(J, N // r), b, D)} multiply-adds"
+    return Code("void", "const blw_real_t *u, const blw_real_t *y, blw_real_t *zeta",
+                tuple(unused + lines), comment)
+
+
+def _quick_limit(model: Model, kalman: "Kalman") -> float | None:
+    """|(x, u, y)|_2 below which no sample can leave its range and no state its bound."""
+    plant: dict[str, Any] = plant_tables(model, kalman).to_json()
+    edges = np.minimum(-np.array(plant["y_min"]), np.array(plant["y_max"]))
+    if edges.min() <= 0.0:
+        return None
+    largest = [float(np.abs(M).sum(axis=1).max(initial=0.0))
+               for M in (np.hstack([model.A, model.Bu]), model.C, kalman.K)]
+    predicted = max(1.0, largest[0])
+    growth = predicted + largest[2] * (2.0 + largest[1] * predicted)
+    limit = float(min(RANGE_LIMIT * edges.min(), SIGNAL_LIMIT / growth))
+    if limit <= np.abs(model.offset).max():
+        return None
+    return limit
+
+
+def _flushed(matrix: Array) -> Array:
+    """As tables.table() stores it: so that what is zero there is zero here."""
+    values = np.asarray(matrix, dtype=float)
+    return np.where(np.abs(values) < float(FLOAT32.tiny), 0.0, values)
+
+
+def _names(letter: str, count: int) -> list[str]:
+    return [f"{letter}{i}" for i in range(count)]
+
+
+def _loads(array: str, names: Iterable[str]) -> list[str]:
+    return [f"const blw_real_t {name} = {array}[{i}];" for i, name in enumerate(names)]
+
+
+def _real(x: float) -> str:
+    return f"BLW_R({literal(x)})"
+
+
+def _product(factor: float, name: str) -> str:
+    if name == "1":
+        return _real(factor)
+    return name if factor == 1.0 else f"({_real(factor)} * {name})"
+
+
+def _tail(factors: Array, names: Sequence[str]) -> str:
+    """" + (a * x) - (b * y)": the terms of a sum that goes on."""
+    return "".join(f" {'-' if a < 0.0 else '+'} {_product(abs(a), name)}"
+                   for a, name in zip(factors.tolist(), names, strict=True) if a)
+
+
+def _sum(factors: Array, names: Sequence[str]) -> str:
+    """The same from its first term on; empty if all factors are zero."""
+    first = next((i for i, a in enumerate(factors.tolist()) if a), None)
+    if first is None:
+        return ""
+    a = float(factors[first])
+    lead = f"-{names[first]}" if a == -1.0 else _product(a, names[first])
+    return lead + _tail(factors[first + 1:], names[first + 1:])
+
+
+def _statement(left: str, right: str) -> list[str]:
+    """left right, wrapped."""
+    return textwrap.wrap(f"{left} {right}", WIDTH, subsequent_indent="    ")
+
+
+def _count(*matrices: Array) -> int:
+    return sum(int(np.count_nonzero(matrix)) for matrix in matrices)
