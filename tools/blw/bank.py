@@ -18,6 +18,7 @@ from blw.model import Model
 from blw.tables import Struct, index, real, table
 
 NAME = "bank"
+AVERAGES = False
 
 CEILING = 1.5             # of an average over its threshold: it recovers in a third of the memory
 SETTLED = 0.01            # part of P_opt that the initial error may still hold

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blw import bank_moments as moments
+from blw import margin
 from blw.errors import DesignError
 from blw.kalman import modes, steady_state, unseen
 from blw.model import Model
@@ -132,7 +133,7 @@ def build(model: Model, options: Options) -> Bank:
         raise DesignError(f"window = {options.window} is not a multiple of the {groups} groups of "
                           "blocks")
     gain = (2.0 / (options.memory + 1) if options.window == "ewma" else groups / options.window)
-    tests = _tests(noise, options, members, blocks, (groups, gain))
+    tests = _tests(noise, options, members, blocks, (groups, gain), margin.sigma(model))
     return Bank(members, blocks, tests, horizon, groups, gain)
 
 
@@ -215,8 +216,12 @@ def _observability_index(model: Model, subset: Sensors) -> int:
 
 
 def _tests(noise: moments.Noise, options: Options, members: list[Member], blocks: list[Block],
-           averaging: tuple[int, float]) -> list[Test]:
-    """All pairs of a set and a subset of it, set by set."""
+           averaging: tuple[int, float], bounds: Array) -> list[Test]:
+    """All pairs of a set and a subset of it, set by set.
+
+    A disturbance that moves the residue by at most delta raises the root of its mean square by no
+    more than that.
+    """
     groups, gain = averaging
     filtered = options.version == "filter"
     found = []
@@ -233,8 +238,21 @@ def _tests(noise: moments.Noise, options: Options, members: list[Member], blocks
                 variance = residue.window_variance(round(1.0 / gain), groups)
                 skewness = None
             epsilon = moments.upper_quantile(mean, variance, risk, skewness) - mean
+            delta = margin.largest(_settled(noise, member, blocks[i], filtered), bounds)
+            if delta > 0.0:
+                epsilon = (np.sqrt(mean + epsilon) + delta) ** 2 - mean
             found.append(Test(number, i, mean, epsilon))
     return found
+
+
+def _settled(noise: moments.Noise, member: Member, block: Block, filtered: bool) -> Array:
+    """[n x m] answer of the residue to constants on the sensors: FIR less filter."""
+    AK = noise.A @ member.K
+    Phi = noise.A - (member.K @ noise.C @ noise.A if filtered else AK @ noise.C)
+    K = member.K if filtered else AK
+    M = -np.linalg.solve(np.eye(len(noise.A)) - Phi, K)
+    M[:, list(block.sensors)] += block.Z.reshape(len(M), block.horizon, -1).sum(axis=1)
+    return M
 
 
 def _names(model: Model, sensors: Sensors) -> str:

@@ -39,6 +39,7 @@ from blw.modes import Modes, modes_of
 Array = NDArray[np.float64]
 
 NAME = "canonical"
+AVERAGES = False
 
 #: First weights - 1; the golden section continues them below WIDEST.
 OFFSETS = (0.0, 0.03, 0.07, 0.13, 0.21, 0.33)

@@ -20,6 +20,7 @@ COMMANDS = {
     "replay": "blw.simulate:replay",
     "report": "blw.report.command:report",
     "export": "blw.logs.export:export",
+    "recorded": "blw.recorded:recorded",
     "import": "blw.importer:import_",
     "joint": "blw.joint_command:joint_group",
     "bench": "blw.cost.command:bench",

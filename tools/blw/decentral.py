@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 import scipy.linalg
 
-from blw import chi2
+from blw import chi2, margin
 from blw.decentral_filters import LocalFilters, local_filters, warm_up
 from blw.decentral_fusion import (
     Fusion,
@@ -34,10 +34,12 @@ from blw.model import Model
 from blw.tables import Index, Real, Struct, Table, index, table
 
 NAME = "decentral"
+AVERAGES = True
 
 FALSE_ALARM = 1e-3
 FALSE_ALARM_PRINTED = 0.05
 READMIT = 20
+MAX_GAP = 3
 
 #: Most sets of sensors that a search may compare.
 _MAX_SETS = 20_000
@@ -61,7 +63,8 @@ class Options:
     gains: Literal["steady", "recursive"] = "steady"
     variant: Literal["corrected", "printed"] = "corrected"
     #: steps that a sensor may be missing before it is left out like an attacked one
-    max_gap: int = field(default=3, metadata={"ge": 1, "le": 65535})
+    #: default: the steps in which MAX_GAP samples of the sensor that sends least should come
+    max_gap: int | None = field(default=None, metadata={"ge": 1, "le": 65535})
     #: limits of the device; one that is not given does not limit
     max_flash_bytes: int | None = field(default=None, metadata={"gt": 0})
     max_ram_bytes: int | None = field(default=None, metadata={"gt": 0})
@@ -76,15 +79,18 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
                           f"sets to compare, at most {_MAX_SETS} are supported")
     if options.gains == "recursive" and options.reseed:
         raise DesignError("reseed needs gains = \"steady\": a recursion would have to change P too")
+    if options.gains == "recursive" and np.any(model.rate < 1.0):
+        raise DesignError("plant.rate needs gains = \"steady\": a recursion would have to know the "
+                          "rate at every step")
     filters = local_filters(model)
     check_redundancy(model, filters)
     fusion = fuse(filters)
     sets, most_rows = excluded_sets(model, filters)
     tree = removal_tree(filters, fusion, sets)
-    ranking = _Ranking(model, filters, tree, options)
+    ranking = _Ranking(model, filters, tree, options, _disturbed(model, filters, fusion))
     P0 = kalman.P if model.P0 is None else model.P0
     steady = options.gains == "steady"
-    engine = (_steady_struct(filters, fusion, tree, options.reseed) if steady
+    engine = (_steady_struct(filters, fusion, tree, options.reseed, model.weight) if steady
               else _recursive_struct(model, filters, fusion, P0))
     mu = int(filters.first[-1])
     tables = Struct("blw_decentral_model_t", NAME, {
@@ -92,7 +98,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "rows": most_rows,
         "warm_up": warm_up(filters, fusion.N, P0) if steady else 0,
         "readmit": _readmit(options),
-        "max_gap": options.max_gap,
+        "max_gap": _max_gap(model, options),
         "reseed": int(options.reseed),
         "first": index(filters.first, "[m + 1] first row of every sensor, then mu"),
         "Phi": table(filters.Phi, "[mu x n] stacked bases Z_i'"),
@@ -114,7 +120,8 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
 class _Ranking:
     """Thresholds by degrees of freedom, and the comparison of sets that differ in them."""
 
-    def __init__(self, model: Model, filters: LocalFilters, tree: list[Node], options: Options):
+    def __init__(self, model: Model, filters: LocalFilters, tree: list[Node], options: Options,
+                 delta: float):
         printed = options.variant == "printed"
         self.false_alarm = options.false_alarm or (FALSE_ALARM_PRINTED if printed else FALSE_ALARM)
         wanted = set(candidates(model))
@@ -124,7 +131,8 @@ class _Ranking:
         self.removed = ranked + others
         base = int(filters.first[-1]) - (0 if printed else model.n)
         self.dof = [base - gone for gone in self.removed]
-        self.thr = [chi2.threshold(self.false_alarm, max(dof, 1)) for dof in self.dof]
+        self.thr = [margin.chi2_threshold(self.false_alarm, max(dof, 1), delta)
+                    for dof in self.dof]
         self.offsets = None
         if len(ranked) > 1:
             dofs = self.dof[:len(ranked)]
@@ -150,6 +158,23 @@ class _Ranking:
         return self.dof[place], self.thr[place]
 
 
+def _disturbed(model: Model, filters: LocalFilters, fusion: Fusion) -> float:
+    """How far the disturbances within noise_margin move w = N z, margin (2).  Without some of the
+    sensors it is less, since w is then projected."""
+    settled = np.zeros((len(filters.K), model.m))
+    for i, F in enumerate(filters.F):
+        rows = filters.rows(i)
+        settled[rows, i] = np.linalg.solve(np.eye(len(F)) - F, filters.K[rows])
+    return margin.largest(fusion.N @ settled, margin.sigma(model))
+
+
+def _max_gap(model: Model, options: Options) -> int:
+    """As given, or MAX_GAP of the steps between two samples of the sensor that sends least."""
+    if options.max_gap is not None:
+        return options.max_gap
+    return int(np.ceil(MAX_GAP / model.rate.min()))
+
+
 def _readmit(options: Options) -> int:
     if options.variant == "printed":
         return 0
@@ -160,8 +185,9 @@ def _innovation_scale(model: Model, filters: LocalFilters, fusion: Fusion,
                       false_alarm: float) -> np.ndarray:
     """[m] 1 / (sigma_i sqrt(thr)): y_i - C_i (A x_hat + Bu u) has the deviation sigma_i."""
     P = fusion.Psi @ filters.P @ fusion.Psi.T
-    S = model.C @ (model.A @ P @ model.A.T + model.W) @ model.C.T + model.R
-    return 1.0 / np.sqrt(np.diag(S) * chi2.threshold(false_alarm, 1))
+    S = model.C @ (model.A @ P @ model.A.T + model.W) @ model.C.T + model.sample_R
+    bound = np.sqrt(np.diag(S) * chi2.threshold(false_alarm, 1)) + margin.sigma(model)
+    return 1.0 / bound
 
 
 def _sets_struct(model: Model, tree: list[Node]) -> Struct:
@@ -176,8 +202,8 @@ def _sets_struct(model: Model, tree: list[Node]) -> Struct:
     })
 
 
-def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node],
-                   reseed: bool) -> Struct:
+def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node], reseed: bool,
+                   weight: np.ndarray) -> Struct:
     mu, first = int(filters.first[-1]), filters.first
     d = len(fusion.N)
     upper = [fusion.N[r, r:] for r in range(d)]
@@ -192,7 +218,7 @@ def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node],
     return Struct("blw_decentral_steady_t", f"{NAME}_steady", {
         "d": d,
         "F": table(np.concatenate([F.ravel() for F in filters.F]), "[mu_i x mu_i] per sensor"),
-        "K": table(filters.K, "[mu] gains"),
+        "K": table(filters.K * np.repeat(weight, filters.mu), "[mu] gains on samples"),
         "N": table(np.concatenate(upper), f"[{d} x {mu}] upper trapezoid, packed by rows"),
         "Psi": table(fusion.Psi, "[n x mu] x_hat = Psi z"),
         "Q": table(np.concatenate(Q), "[mu_i x min(first[i + 1], d)] per sensor, N_i = Q_i R_i"),

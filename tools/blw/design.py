@@ -73,6 +73,9 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         kalman = steady_state(model.A, model.C, model.W, model.R)
     except DesignError as error:
         raise DesignError(f"{where}: {error}") from None
+    averaged = model.averaged()
+    averaged_kalman = (kalman if np.all(model.rate == 1.0)
+                       else steady_state(model.A, model.C, model.W, averaged.R))
     plant = plant_tables(model, kalman)
     plant.check()
     designed: dict[str, Designed] = {}
@@ -80,7 +83,9 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
     for name in dict.fromkeys(methods or REGISTRY):
         progress(name)
         try:
-            result = REGISTRY[name].design(model, kalman, parsed[name])
+            module = REGISTRY[name]
+            served = (averaged, averaged_kalman) if module.AVERAGES else (model, kalman)
+            result = module.design(*served, parsed[name])
             result.tables.check()
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import guard_fusion, guard_order
+from blw import guard_fusion, guard_order, margin
 from blw.design import Designed
 from blw.errors import DesignError, ModelError
 from blw.guard_filters import Filters, filters
@@ -25,6 +25,7 @@ from blw.tables import Struct, Table, index, real, table
 Array = NDArray
 
 NAME = "guard"
+AVERAGES = True
 
 DEFAULT_RECOVERY = 0.99
 
@@ -71,6 +72,9 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     check_options(options, model)
     poles = np.linalg.eigvals(kalman.Acl)
     bank = filters(model, guard_order.reduced(poles, options.order or model.n))
+    if bank.split.n_u < model.n and np.any(model.rate < 1.0):
+        raise DesignError("plant.rate needs modes that are all fused securely, but "
+                          f"{model.n - bank.split.n_u} of A decay faster; use decentral")
     try:
         fusion = guard_fusion.fuse(bank)
     except np.linalg.LinAlgError:
@@ -107,7 +111,7 @@ def choose_limits(
     """As given, or from the wanted probability of returning exactly the Kalman estimate."""
     samples = guard_fusion.largest_multiplier(fusion)
     wanted = options.recovery_probability or DEFAULT_RECOVERY
-    k = options.k or float(np.quantile(samples, wanted))
+    k = options.k or float(np.quantile(samples, wanted) + disturbed(model, fusion).max())
     exclude = options.exclude or EXCLUDE * k
     if exclude < k:
         raise ModelError(f"method.{NAME}: exclude is {exclude:g}; it must be at least k = {k:g}")
@@ -147,7 +151,7 @@ def struct(model: Model, bank: Filters, fusion: Fusion, limits: Limits) -> Struc
         "warm_up": limits.warm_up,
         "unit": index(unit_numbers(model), "[m] the sensor's unit"),
         "rank": index(fusion.rank, "[m] ones in S_ii"),
-        **matrices(bank, fusion, pairs),
+        **matrices(bank, fusion, pairs, model.weight),
         "effect": table(effects(bank, fusion), "[m] |d x_hat / d tau_i|_2"),
         "drift": table(drift_thresholds(model, bank, fusion), "[m] on |average of l_i|"),
         "k": real(limits.k),
@@ -183,8 +187,8 @@ def needs_search(model: Model, ratios: Array, rows: int) -> bool:
     """Whether a convex penalty alone may be led astray, and a search is affordable."""
     sets = comb(len(model.units), model.p)
     affordable = sets * (rows**3 / 6 + rows**2) <= SEARCH_LIMIT
-    return bool(model.p > 0 and ratios.max() >= 1.0 - 1e-3 and affordable
-                and (model.p > 1 or model.groups))
+    misled = ratios.max() >= 1.0 - 1e-3 or model.noise_margin > 0.0
+    return bool(model.p > 0 and misled and affordable and (model.p > 1 or model.groups))
 
 
 def default_updates(model: Model, search: bool, recovery: float) -> int:
@@ -204,17 +208,21 @@ def rows_of(Lam: Array, reach: int) -> Array:
     return np.concatenate([row[max(0, a - reach) :] for a, row in enumerate(Lam)])
 
 
-def matrices(bank: Filters, fusion: Fusion, pairs: bool) -> dict[str, Table | None]:
-    """The members Lam to Sig; without pairs, no V and no s."""
+def matrices(
+    bank: Filters, fusion: Fusion, pairs: bool, weight: Array
+) -> dict[str, Table | None]:
+    """The members Lam to Sig; without pairs, no V and no s.  weight [m]: steps that a sample
+    stands for."""
     split, r = bank.split, bank.r
     below = [strips(fusion.S[fusion.rows(i), : i * r]) for i in range(1, bank.m)]
     N, n_u, n_s = bank.N, split.n_u, split.As.shape[0]
-    reach = fusion.reach
     vectors, values = guard_fusion.excluded_spectra(fusion) if pairs else (np.zeros((0, 0)),) * 2
+    b = fusion.b[:, : fusion.reach] * weight[:, None]
+    banded = [rows_of(L, fusion.reach) for L in fusion.Lam]
     turned = [strips(V) for per_sensor in vectors for V in per_sensor]
     return {
-        "Lam": table(np.concatenate([rows_of(L, reach) for L in fusion.Lam]), "by rows, banded"),
-        "b": table(fusion.b[:, :reach], f"[{bank.m}][{reach}]"),
+        "Lam": table(np.concatenate(banded), "by rows, banded"),
+        "b": table(b, f"[{bank.m}][{fusion.reach}]"),
         "S": table(np.concatenate([*below, []]), "S below its diagonal, sensor by sensor"),
         "V": table(np.concatenate([*turned, []]), "eigenvectors of S_ii without sensor j"),
         "s": table(values, "eigenvalues of S_ii without sensor j"),
@@ -224,6 +232,16 @@ def matrices(bank: Filters, fusion: Fusion, pairs: bool) -> dict[str, Table | No
         "Xs": table(split.Xs, "[n x n_s]"),
         "Sig": table(strips(fusion.Sig), f"[{n_s} x {N}]"),
     }
+
+
+def disturbed(model: Model, fusion: Fusion) -> Array:
+    """[m] how far the disturbances within noise_margin move l_i, margin (2)."""
+    r, bounds = fusion.r, margin.sigma(model)
+    settled = np.zeros((model.m * r, model.m))
+    for i in range(model.m):
+        settled[fusion.rows(i), i] = np.linalg.solve(np.eye(r) - fusion.Lam[i], fusion.b[i])
+    M = fusion.S @ settled
+    return np.array([margin.largest(M[fusion.rows(i)], bounds) for i in range(model.m)])
 
 
 def norm(M: Array) -> float:
@@ -285,7 +303,7 @@ def drift_thresholds(model: Model, bank: Filters, fusion: Fusion) -> Array:
         block = cov[fusion.rows(i), fusion.rows(i)]
         mean, spread = np.trace(block), np.sqrt(2.0 * np.sum(block * block))
         found.append(np.sqrt(max(mean + DRIFT_SIGMAS * spread, 1e-12)))
-    return np.array(found)
+    return np.array(found) + disturbed(model, fusion)
 
 
 def filter_figures(model: Model, kalman: Kalman, bank: Filters, fusion: Fusion) -> dict[str, Any]:

@@ -15,8 +15,10 @@ import click
 
 from blw.atomic import write_files
 from blw.errors import ModelError
+from blw.identify import LEAST_MARGIN, identify, with_plant
 from blw.model import Model, parse
 from blw.reader import is_finite, is_number
+from blw.report.csv_file import CsvFile
 
 # Kind of attack in attacks.json -> kind in an attack file.
 KINDS = {"bias": "bias", "ramp": "ramp", "scale": "scale", "freeze": "stuck", "noise": "white",
@@ -41,15 +43,22 @@ WITHOUT_VALUE = ("stuck", "drop")
 @click.option("--out-map", type=click.Path(path_type=Path, dir_okay=False), metavar="MAP.toml",
               help="Column map for `replay --map` to write.")
 @click.option("--time-column", default="t", show_default=True, help="Column of time in seconds.")
+@click.option("--log", type=click.Path(path_type=Path, exists=True, dir_okay=False),
+              metavar="LOG.csv", help="A log without attacks, one row per step, to identify rate, "
+              "noise_margin and x0 from.")
 def import_(source: Path, out: Path, name: str | None, p: int | None, no_groups: bool,
             attacks: Path | None, out_attacks: Path | None, out_map: Path | None,
-            time_column: str) -> None:
+            time_column: str, log: Path | None) -> None:
     """Translate an identified model, its attacks and its log columns to Bulwark's files."""
     if (attacks is None) != (out_attacks is None):
         raise click.UsageError("--attacks and --out-attacks go together")
-    raw = _read_object(source)
+    raw = read_object(source)
     mapping = model_mapping(raw, str(source), name or default_name(source), p, not no_groups)
     model = parse(mapping, str(source))
+    if log is not None:
+        samples = CsvFile.read(log).numbers(model.sensors)
+        mapping = with_plant(mapping, identify(model, samples, str(log)))
+        model = parse(mapping, str(source))
     jobs = [(out.parent, {out.name: model_toml(mapping)})]
     if attacks is not None and out_attacks is not None:
         jobs.append((out_attacks, attack_files(_read(attacks), str(attacks), model)))
@@ -73,7 +82,9 @@ def model_mapping(raw: Mapping[str, Any], where: str, name: str, p: int | None,
     for key in ("A", "C", "Q", "R", "sensors", "dt"):
         if key not in raw:
             raise ModelError(f"{where}: {key} is missing")
-    plant = {"states": _state_names(raw["states"], where)} if "states" in raw else {}
+    plant: dict[str, Any] = {"noise_margin": LEAST_MARGIN}
+    if "states" in raw:
+        plant["states"] = _state_names(raw["states"], where)
     plant |= {key: raw[key] for key in ("sensors", "A", "C", "Q", "R", "offset", "P0")
               if key in raw}
     claim = raw.get("p_max_groups" if groups else "p_max_sensors", 1)
@@ -95,8 +106,7 @@ def model_toml(mapping: Mapping[str, Any]) -> str:
 
 def attack_files(raw: Any, where: str, model: Model) -> dict[str, str]:
     """File name -> attack file, for the attacks whose sensors the model has."""
-    if not isinstance(raw, list):
-        raise ModelError(f"{where}: must be a list of attacks")
+    _check_list(raw, where)
     found = {}
     for number, attack in enumerate(raw, start=1):
         text = _attack_toml(attack, f"{where}: attack {number}", model)
@@ -177,7 +187,24 @@ def _read(path: Path) -> Any:
         raise ModelError(f"{path}: not JSON: {error}") from None
 
 
-def _read_object(path: Path) -> Mapping[str, Any]:
+def read_list(path: Path) -> list[dict[str, Any]]:
+    """An attacks.json of attacks on sensors of models that may lack some.  Raises ModelError."""
+    raw = _read(path)
+    _check_list(raw, str(path))
+    for number, attack in enumerate(raw, start=1):
+        if not isinstance(attack, Mapping) or not isinstance(attack.get("sensors"), list):
+            raise ModelError(f"{path}: attack {number}: must be an object with a list of sensors")
+        if not isinstance(attack.get("id"), str):
+            raise ModelError(f"{path}: attack {number}: id must be a string")
+    return raw
+
+
+def _check_list(raw: Any, where: str) -> None:
+    if not isinstance(raw, list):
+        raise ModelError(f"{where}: must be a list of attacks")
+
+
+def read_object(path: Path) -> Mapping[str, Any]:
     raw = _read(path)
     if not isinstance(raw, Mapping):
         raise ModelError(f"{path}: must be an object with A, C, Q, R, sensors and dt")

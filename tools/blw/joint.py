@@ -23,6 +23,7 @@ from blw.tables import Struct, index, table
 Array = NDArray[np.float64]
 
 NAME = "joint"
+AVERAGES = False
 
 DEFAULT_ETA = 10.0   # times the variance of the weak sensor's noise
 DECAYED = 1.05       # the initial error has decayed: variance over its limit

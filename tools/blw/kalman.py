@@ -10,7 +10,7 @@ A mode that no sensor sees but that dies out by itself is kept: the filter predi
 that need every mode to be seen refuse such a model.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from blw.model import Model
 from blw.tables import Struct, table
 
 NAME = "kalman"
+AVERAGES = True
 
 UNIT_CIRCLE = 1e-8     # an eigenvalue this close to it counts as on it
 CLUSTER = 1e-4         # eigenvalues of a defective matrix scatter; their mean does not
@@ -107,10 +108,11 @@ def mode_text(z: complex) -> str:
 
 def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables of blw_kalman_model_t, and a detector on the filter's innovations."""
+    on_samples = replace(kalman, K=kalman.K * model.weight)
     tables = Struct("blw_kalman_model_t", NAME,
-                    {"K": table(kalman.K, "[n x m] steady-state gain"),
-                     "step": straight.kalman_step(model, kalman)}, method=NAME)
-    S = model.C @ kalman.Pp @ model.C.T + model.R
+                    {"K": table(on_samples.K, "[n x m] steady-state gain"),
+                     "step": straight.kalman_step(model, on_samples)}, method=NAME)
+    S = model.C @ kalman.Pp @ model.C.T + model.sample_R
     info = {
         "trace_P": float(np.trace(kalman.P)),
         "sigma": np.sqrt(np.diag(kalman.P)).tolist(),

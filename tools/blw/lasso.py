@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import admm_tuning, l1, straight
+from blw import admm_tuning, l1, margin, straight
 from blw.design import Designed
 from blw.errors import ModelError
 from blw.kalman import Kalman
@@ -23,6 +23,7 @@ from blw.tables import Struct, table
 Array = NDArray[np.float64]
 
 NAME = "lasso"
+AVERAGES = False
 
 DEFAULT_RECOVERY = 0.9
 
@@ -71,7 +72,7 @@ def assemble(
 ) -> Designed:
     """Tables blw_lasso_model_t and figures of one fusion; chooses gamma and the engine."""
     reduced_form, groups = fusion.reduced, fusion.groups
-    gamma, figures = choose_gamma(reduced_form, groups, options)
+    gamma, figures = choose_gamma(fusion, model, options)
     problem = admm_tuning.Problem(reduced_form, groups, fusion.F, gamma, fusion.response)
     engine, engine_figures = choose_engine(problem, kalman, options)
     P = None if fusion.P is None else table(fusion.P, "[m][r x r] to canonical coordinates")
@@ -120,15 +121,28 @@ def unchecked_sensors(reduced_form: l1.Reduced, model: Model) -> list[str]:
     return [model.sensors[i] for i in sorted({row // r for row in reduced_form.unchecked})]
 
 
+def disturbed(fusion: Fusion, model: Model) -> float:
+    """How far the disturbances within noise_margin move |l_g| / w_g, margin (2)."""
+    form, groups, r = fusion.reduced, fusion.groups, fusion.response.shape[1]
+    settled = np.zeros((form.scale.size, model.m))
+    for i, answer in enumerate(fusion.response):
+        settled[i * r : (i + 1) * r, i] = form.scale[i * r : (i + 1) * r] * answer
+    M, bounds = form.S @ settled, margin.sigma(model)
+    spans = zip(groups.first[:-1], groups.first[1:], strict=True)
+    moved = np.array([margin.largest(M[first:last], bounds) for first, last in spans])
+    return float(np.max(moved / l1.thresholds(form, groups, 1.0)))
+
+
 def choose_gamma(
-    reduced_form: l1.Reduced, groups: l1.Groups, options: Any
+    fusion: Fusion, model: Model, options: Any
 ) -> tuple[float, dict[str, Any]]:
     """gamma as given, or from the wanted probability of returning exactly the Kalman estimate."""
+    reduced_form, groups = fusion.reduced, fusion.groups
     samples = l1.recovery_statistic(reduced_form, groups)
     gamma = options.gamma
     if gamma is None:
         wanted = options.recovery_probability or DEFAULT_RECOVERY
-        gamma = float(np.quantile(samples, wanted))
+        gamma = float(np.quantile(samples, wanted) + disturbed(fusion, model))
     figures = {
         "gamma": gamma,
         "recovery_probability": l1.probability(samples, gamma),

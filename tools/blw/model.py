@@ -9,7 +9,7 @@ import hashlib
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +26,18 @@ METHOD_NAMES = ("kalman", "lasso", "canonical", "joint", "decentral", "bank", "g
 MAX_SENSORS = 64
 MAX_SIZE = 255
 SYMMETRY = 1e-9
+#: A sensor that sends more rarely has to be modelled on slower steps.
+MIN_RATE = 0.01
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A checked, discrete-time model.  Sizes: n states, m sensors, l inputs, s noise sources."""
+    """A checked, discrete-time model.  Sizes: n states, m sensors, l inputs, s noise sources.
+
+    sample_R is the covariance of single samples: R, except in what averaged() returns.
+    """
 
     name: str
     dt_s: float
@@ -50,6 +55,9 @@ class Model:
     P0: Array | None
     offset: Array
     range: Array
+    rate: Array
+    sample_R: Array
+    noise_margin: float
     states: list[str]
     sensors: list[str]
     inputs: list[str]
@@ -64,6 +72,19 @@ class Model:
         """[n, n] covariance of the process noise as the state sees it, B Q B'."""
         W = self.B @ self.Q @ self.B.T
         return (W + W.T) / 2
+
+    @property
+    def weight(self) -> Array:
+        """[m] steps that one sample stands for, 1 / rate."""
+        return 1.0 / self.rate
+
+    def averaged(self) -> "Model":
+        """The same plant with sensors that send in every step and tell as much in the long run.
+
+        A sample in a share q of the steps that counts 1/q times has the mean of one in every
+        step, and the noise R / q (docs/recorded.md).
+        """
+        return replace(self, R=self.R * np.sqrt(np.outer(self.weight, self.weight)))
 
     @property
     def units(self) -> list[list[int]]:
@@ -102,7 +123,7 @@ def _build(mapping: Mapping[str, Any], where: str, path: str, sha256: str) -> Mo
     dt_s = top.positive("dt_s")
     plant = Reader(top.table("plant", required=True), f"{where}: plant.",
                    ("states", "sensors", "inputs", "A", "Bu", "B", "C", "Q", "R", "x0", "P0",
-                    "offset", "range", "continuous"))
+                    "offset", "range", "rate", "noise_margin", "continuous"))
     parts = _dynamics(plant, dt_s)
     parts |= _labels(plant, parts)
     parts |= _measurement(plant, parts)
@@ -192,9 +213,28 @@ def _labels(plant: Reader, parts: dict[str, Any]) -> dict[str, list[str]]:
 
 def _measurement(plant: Reader, parts: dict[str, Any]) -> dict[str, Any]:
     m = parts["m"]
-    return {"R": covariance(plant, "R", m, definite=True, labels=parts["sensors"]),
+    R = covariance(plant, "R", m, definite=True, labels=parts["sensors"])
+    return {"R": R, "sample_R": R,
             "offset": plant.vector("offset", m, default=np.zeros(m)),
-            "range": plant.ranges("range", m)}
+            "range": plant.ranges("range", m),
+            "rate": _rates(plant, parts), "noise_margin": _noise_margin(plant)}
+
+
+def _noise_margin(plant: Reader) -> float:
+    """At least 0, in standard deviations of R."""
+    if plant.raw.get("noise_margin", 0) == 0:
+        return 0.0
+    return plant.positive("noise_margin")
+
+
+def _rates(plant: Reader, parts: dict[str, Any]) -> Array:
+    """[m] share of the steps in which a sensor sends, above 0 and at most 1."""
+    rate = plant.vector("rate", parts["m"], default=np.ones(parts["m"]))
+    for name, value in zip(parts["sensors"], rate, strict=True):
+        if not MIN_RATE <= value <= 1.0:
+            plant.fail("rate", f"is {value:g} for {name}; it must be at least {MIN_RATE:g} and at "
+                               "most 1")
+    return rate
 
 
 def _attack(attack: Reader, sensors: list[str]) -> dict[str, Any]:
