@@ -132,6 +132,13 @@ static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, blw_mas
         }
         column++;
     }
+    if (self->gross[set] > BLW_R(1.0)) {
+        self->wait[set] = self->model->horizon;
+    } else if (self->wait[set] > 0U) {
+        self->wait[set]--;
+    } else {
+        /* nothing gross in the last block */
+    }
     if (!blw_la_bounded(n, d)) {
         blw_la_fill(n, BLW_R(0.0), d);
         blw_la_fill(n, BLW_R(0.0), d_bar);
@@ -149,14 +156,37 @@ static void advance_filters(blw_bank_t *self, blw_mask_t used)
     }
 }
 
-/* What speaks against a set, over its threshold: the averages, and at once a gross innovation. */
+/* What speaks against a set, over its threshold: the averages, and for a block's length a gross
+ * innovation. */
 static blw_real_t evidence(const blw_bank_t *self, size_t set)
 {
-    return self->decided ? blw_la_max(self->worst[set], self->gross[set]) : BLW_R(0.0);
+    if (!self->decided) {
+        return BLW_R(0.0);
+    }
+    const blw_real_t gross = (self->wait[set] > 0U) ? self->model->ceiling : BLW_R(0.0);
+
+    return blw_la_max(blw_la_max(self->worst[set], self->gross[set]), gross);
+}
+
+/* If none passes the choice stays, unless the gate speaks against it: then it is the set with the
+ * least averages of those that the gate lets through, if there is one. */
+static void hold(blw_bank_t *self)
+{
+    blw_real_t least = BLW_REAL_MAX;
+
+    if (self->wait[self->choice] == 0U) {
+        return;
+    }
+    for (size_t s = 0U; s < self->model->sets; s++) {
+        if ((self->wait[s] == 0U) && (self->worst[s] < least)) {
+            least        = self->worst[s];
+            self->choice = (uint8_t)s;
+        }
+    }
 }
 
 /* The first passing set, that is the one with the least P_opt, of those that lack fewest samples.
- * @return false if none passes: the choice stays. */
+ * @return false if none passes */
 static bool choose(blw_bank_t *self, blw_mask_t used)
 {
     unsigned fewest = BLW_BANK_MAX_SENSORS + 1U;
@@ -169,7 +199,11 @@ static bool choose(blw_bank_t *self, blw_mask_t used)
             self->choice = (uint8_t)s;
         }
     }
-    return fewest <= BLW_BANK_MAX_SENSORS;
+    if (fewest > BLW_BANK_MAX_SENSORS) {
+        hold(self);
+        return false;
+    }
+    return true;
 }
 
 /* The chosen set's estimate is returned and becomes the reference. */

@@ -6,8 +6,8 @@ static bool sizes_ok(const blw_bank_model_t *model)
     const blw_plant_t *const plant = model->head.plant;
 
     return (plant->m <= BLW_BANK_MAX_SENSORS) && (plant->p <= BLW_BANK_MAX_ATTACKED)
-           && (model->sets >= 1U) && (model->subsets >= 1U) && (model->per_set >= 1U)
-           && (model->horizon >= 1U) && (model->warm_up >= model->horizon)
+           && (model->sets >= 1U) && (model->sets <= BLW_BANK_MAX_SETS) && (model->subsets >= 1U)
+           && (model->per_set >= 1U) && (model->horizon >= 1U) && (model->warm_up >= model->horizon)
            && (model->filtered <= 1U);
 }
 

@@ -14,6 +14,9 @@ void blw_bank_judge_reset(blw_bank_t *self)
     }
     blw_la_fill(model->sets, BLW_R(0.0), self->worst);
     blw_la_fill(model->sets, BLW_R(0.0), self->gross);
+    for (size_t s = 0U; s < model->sets; s++) {
+        self->wait[s] = 0U;
+    }
     self->blocks  = 0U;
     self->decided = false;
 }

@@ -89,7 +89,7 @@ def layouts(real: type) -> dict[str, type]:
                                               "past_e", "past_move", "block", "x_fir", "average",
                                               "worst", "gross", "suspicion")]
                     + [("k", word), ("blocks", word), ("newest", byte), ("choice", byte),
-                       ("decided", ct.c_bool), ("age", byte * 8)])
+                       ("decided", ct.c_bool), ("age", byte * 8), ("wait", byte * 28)])
 
     class Out(ct.Structure):
         _fields_ = [("x_hat", pointer), ("suspicion", pointer), ("statistic", real),

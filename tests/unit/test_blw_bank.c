@@ -82,6 +82,37 @@ static void test_step_given_a_gross_sample_changes_the_set_at_once(void)
     TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_CONVERGED, out.outcome);
 }
 
+static void test_step_given_a_gross_sample_keeps_its_sets_out_for_a_block(void)
+{
+    for (size_t i = 0U; i < BANK_PAIRS; i++) {
+        made.scale[i] = BLW_R(1e-6); /* the averages never object */
+    }
+    start_bank();
+    step_with(1.0, 0.0, 0.0, 0.0, 7U);
+    step_with(1.5, 0.0, 0.0, 0.0, 7U);
+    step_with(1.75, 20.0, 0.0, 0.0, 7U);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    step_with(1.875, 0.0, 0.0, 0.0, 7U);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    TEST_ASSERT_REAL_WITHIN(0.0, 2.25, out.statistic); /* the ceiling */
+    step_with(1.9375, 0.0, 0.0, 0.0, 7U);
+    TEST_ASSERT_EQUAL_HEX64(0U, out.excluded);
+}
+
+static void test_step_given_no_passing_set_leaves_a_choice_that_the_gate_rejects(void)
+{
+    made.scale[4] = BLW_R(1e6); /* {1,2} fails at the least residue */
+    start_bank();
+    step_with(1.0, 0.0, 1.0, 0.0, 7U);
+    step_with(1.5, 0.0, 1.0, 0.0, 7U);
+    TEST_ASSERT_EQUAL_HEX64(0U, bank.choice);
+    TEST_ASSERT_TRUE(bank.worst[2] > BLW_R(1.0));
+    step_with(1.75, 30.0, 1.0, 0.0, 7U);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    TEST_ASSERT_TRUE(out.x_hat[0] < BLW_R(3.0));
+}
+
 static void test_step_given_no_passing_set_holds_the_last_choice(void)
 {
     step_with(1.0, 6.0, 0.0, 0.0, 7U);
@@ -240,6 +271,8 @@ int main(void)
     RUN_TEST(test_step_given_an_attacked_sensor_yields_hand_computed_decision);
     RUN_TEST(test_step_given_prediction_version_returns_estimates_without_the_newest_sample);
     RUN_TEST(test_step_given_a_gross_sample_changes_the_set_at_once);
+    RUN_TEST(test_step_given_a_gross_sample_keeps_its_sets_out_for_a_block);
+    RUN_TEST(test_step_given_no_passing_set_leaves_a_choice_that_the_gate_rejects);
     RUN_TEST(test_step_given_no_passing_set_holds_the_last_choice);
     RUN_TEST(test_step_given_a_gap_prefers_complete_sets_and_waits_for_complete_blocks);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);

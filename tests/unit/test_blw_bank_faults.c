@@ -47,6 +47,8 @@ static void test_init_given_sizes_out_of_limits_refuses(void)
     assert_refused();
     made.model.sets = 0U;
     assert_refused();
+    made.model.sets = BLW_BANK_MAX_SETS + 1U;
+    assert_refused();
     made.model.subsets = 0U;
     assert_refused();
     made.model.per_set = 0U;

@@ -134,7 +134,7 @@ def _info(model: Model, options: Options, bank: Bank, warm_up: int) -> dict[str,
                    "epsilon": test.epsilon} for test in bank.tests],
         "P_opt_max": max(p_opt),
         "epsilon_max": epsilon,
-        "guarantee": max(p_opt) + 2.0 * epsilon,
+        "guarantee": max(p_opt) + epsilon,
         "footprint": footprint(model, bank),
         "advice": _advice(model, options, bank, epsilon / max(p_opt)),
     }

@@ -46,7 +46,8 @@ class Options:
     false_rejection  probability that a set without attack fails at a decision, at most
     left_inverse     "gls": least variance; "pinv": as printed in [B]
     version          "filter": estimates from y(1..k); "prediction": from y(1..k-1)
-    gate             an innovation larger than this many standard deviations rejects a set at once
+    gate             an innovation larger than this many standard deviations rejects a set at once,
+                     for one horizon
     grouped          with a window, as printed: one average for each of `horizon` groups of blocks
                      that do not overlap
     """

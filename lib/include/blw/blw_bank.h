@@ -11,8 +11,11 @@
  *  none passes the last choice is kept and the outcome is BLW_OUTCOME_HELD.  The average is
  *      exponentially weighted, and decides in every step (window = 0), or                     (4)
  *      the mean of one window of blocks, and decides at its end for the next one.             (5)
- *  So that the first steps of a gross attack do no harm, a set whose innovations (1) are beyond the
- *  gate does not pass in that step either; this test is not in [B].
+ *  So that the first steps of a gross attack do no harm, a set with an innovation (1) beyond the
+ *  gate does not pass for h steps from that one on, after which (3) has held the filter that the
+ *  sample reached against the block; this test is not in [B].  If none passes, and the gate speaks
+ *  against the last choice, that of the sets without a gross innovation with the least averages
+ *  takes its place.
  *
  *  All of it runs relative to one reference trajectory x_ref, the estimate itself: the filters keep
  *  d_s = x_s - x_ref, the blocks hold innovations of x_ref.  So the residues stay at noise size
@@ -33,10 +36,11 @@ extern "C" {
 /** Limits of the method; init refuses a model beyond them. */
 #define BLW_BANK_MAX_SENSORS  8U
 #define BLW_BANK_MAX_ATTACKED 2U
+#define BLW_BANK_MAX_SETS     28U /* ways to leave 2 of 8 sensors out */
 
 typedef struct blw_bank_model {
     blw_model_t       head;
-    uint8_t           sets;        /**< filters, in the order of P_opt, >= 1 */
+    uint8_t           sets;        /**< filters, in the order of P_opt, 1..28 */
     uint8_t           subsets;     /**< different subsets, >= 1 */
     uint8_t           per_set;     /**< subsets in a set, >= 1 */
     uint8_t           horizon;     /**< h, samples in a block, >= 1 */
@@ -80,6 +84,7 @@ typedef struct blw_bank {
     uint8_t                 choice;    /* the set that is returned */
     bool                    decided;   /* at least once since reset */
     uint8_t                 age[BLW_BANK_MAX_SENSORS]; /* samples since the last gap, at most h */
+    uint8_t                 wait[BLW_BANK_MAX_SETS];   /* steps that a gate keeps the set out */
 } blw_bank_t;
 
 /** Number of blw_real_t that init() needs; averages = sets x per_set x groups. */
