@@ -33,6 +33,7 @@ static void bind(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *
     self->step      = blw_la_take(&mem, (size_t)model->most * model->r);
     self->turned    = blw_la_take(&mem, 3U * (size_t)model->r);
     self->L         = mem;
+    self->all       = BLW_MASK_ALL(m);
 }
 
 blw_status_t blw_guard_init(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *mem,
@@ -133,26 +134,22 @@ static void advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used)
     }
 }
 
-/* l = S e, |l_i|^2 and the largest of them; a NaN or an infinity in l makes it infinite or NaN. */
+/* l = S e, h_i = |l_i| and the largest square; a NaN or an infinity in l makes that infinite or
+ * NaN. */
 static blw_real_t test(blw_guard_t *self)
 {
-    const size_t      r       = self->model->r;
-    const size_t      m       = self->model->head.plant->m;
-    const blw_real_t *l       = self->l;
-    blw_real_t        largest = BLW_R(0.0);
-    blw_real_t        all     = BLW_R(0.0);
+    const size_t m       = self->model->head.plant->m;
+    blw_real_t   largest = BLW_R(0.0);
+    blw_real_t   all     = BLW_R(0.0);
 
     blw_guard_multipliers(self->model, self->e, self->l);
+    blw_guard_squares(self->model, self->l, self->h);
     for (size_t i = 0U; i < m; i++) {
-        blw_real_t g = BLW_R(0.0);
+        const blw_real_t square = self->h[i];
 
-        for (size_t a = 0U; a < r; a++) {
-            g += l[a] * l[a];
-        }
-        self->h[i] = g;
-        all += g;
-        largest = blw_la_max(largest, g);
-        l += r;
+        self->h[i] = blw_la_sqrt(square);
+        all += square;
+        largest = blw_la_max(largest, square);
     }
     return (all <= BLW_REAL_MAX) ? largest : all;
 }
@@ -181,28 +178,33 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
     const size_t                   n_u   = model->n_u;
     const size_t                   N     = (size_t)model->head.plant->m * model->r;
 
-    blw_la_fill(n, BLW_R(0.0), self->d);
-    guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
-    if (n_u == n) {
-        for (size_t j = 0U; j < n; j++) {
-            self->x_ref[j] = self->x_bar[j] + self->d[j];
-            self->x_hat[j] = self->x_ref[j];
-            self->d[j]     = -self->d[j];
-        }
-        guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
+    if (model->fuse != NULL) {
+        model->fuse(tau, self->e, self->x_bar, self->x_ref, self->eta);
+        blw_la_copy(n, self->x_ref, self->x_hat);
         return;
     }
+    blw_la_fill(n, BLW_R(0.0), self->d);
+    guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
     blw_la_copy(n, self->x_bar, self->x_ref);
-    blw_la_gemv_add(n, n_u, model->Xu, self->d, self->x_ref);
-    blw_la_copy(N, self->e, self->eta);
+    if (n_u == n) {
+        blw_la_axpy(n, BLW_R(1.0), self->d, self->x_ref);
+    } else {
+        blw_la_gemv_add(n, n_u, model->Xu, self->d, self->x_ref);
+    }
     for (size_t j = 0U; j < n_u; j++) {
         self->d[j] = -self->d[j];
     }
-    guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
-    blw_la_fill(n, BLW_R(0.0), self->d);
-    guard_mul(n - n_u, N, 0U, N, model->Sig, self->l, self->d);
+    if (n_u > 0U) {
+        guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
+    } else {
+        blw_la_copy(N, self->e, self->eta);
+    }
     blw_la_copy(n, self->x_ref, self->x_hat);
-    blw_la_gemv_add(n, n - n_u, model->Xs, self->d, self->x_hat);
+    if (n_u < n) {
+        blw_la_fill(n, BLW_R(0.0), self->d);
+        guard_mul(n - n_u, N, 0U, N, model->Sig, self->l, self->d);
+        blw_la_gemv_add(n, n - n_u, model->Xs, self->d, self->x_hat);
+    }
 }
 
 /* Start again from the prediction; only samples at the limit of the numbers lead here. */
@@ -217,39 +219,44 @@ static void restart(blw_guard_t *self)
     blw_la_fill(N, BLW_R(0.0), self->average);
 }
 
-/* |average of l_i| / drift_i, or 0 as long as that is below 1; the average is advanced. */
-static blw_real_t drift_of(const blw_guard_model_t *model, size_t i, const blw_real_t *l,
-                           blw_real_t *average)
+/* Advance the averages of l. */
+static void average(const blw_guard_model_t *model, const blw_real_t *l, blw_real_t *mean,
+                    blw_real_t *squares)
 {
-    const size_t     r    = model->r;
+    const size_t     N    = (size_t)model->head.plant->m * model->r;
     const blw_real_t gain = model->gain;
-    blw_real_t       sum  = BLW_R(0.0);
 
-    for (size_t a = 0U; a < r; a++) {
-        const blw_real_t mean = average[a] + (gain * (l[a] - average[a]));
-
-        average[a] = mean;
-        sum += mean * mean;
+    if (model->average != NULL) {
+        model->average(l, mean, squares);
+        return;
     }
-    const bool quiet = sum <= (model->drift[i] * model->drift[i]);
-    return quiet ? BLW_R(0.0) : (blw_la_sqrt(sum) / model->drift[i]);
+    for (size_t a = 0U; a < N; a++) {
+        mean[a] = mean[a] + (gain * (l[a] - mean[a]));
+    }
+    blw_guard_squares(model, mean, squares);
 }
 
-/* s / (1 + s) with s = |h_i| / k, or what the slow average says if that is more. */
+/* s / (k + s) with s = |h_i|, or what the slow average says if that is more. */
 static void judge_sensors(blw_guard_t *self, blw_mask_t used)
 {
     const blw_guard_model_t *const model = self->model;
+    const blw_real_t *const        drift = model->drift;
     const size_t                   m     = model->head.plant->m;
-    blw_mask_t                     rest  = used;
-    size_t                         row   = 0U;
+    blw_real_t *const              found = self->suspicion;
 
+    average(model, self->l, self->average, found);
     for (size_t i = 0U; i < m; i++) {
-        const blw_real_t drift = drift_of(model, i, &self->l[row], &self->average[row]);
-        const blw_real_t s     = blw_la_max(self->h[i], drift * model->k);
+        blw_real_t s = self->h[i];
 
-        self->suspicion[i] = ((rest & 1U) != 0U) ? (s / (s + model->k)) : BLW_R(1.0);
-        rest >>= 1;
-        row += model->r;
+        if (!(found[i] <= (drift[i] * drift[i]))) {
+            s = blw_la_max(s, (model->k * blw_la_sqrt(found[i])) / drift[i]);
+        }
+        found[i] = s / (s + model->k);
+    }
+    for (size_t i = 0U; (used != self->all) && (i < m); i++) {
+        if (!guard_has(used, i)) {
+            found[i] = BLW_R(1.0);
+        }
     }
 }
 
@@ -261,7 +268,10 @@ static void report(blw_guard_t *self, blw_mask_t used, blw_estimator_out_t *out)
     out->excluded   = self->excluded;
     out->used       = used;
     out->iterations = self->updates;
-    out->flags      = blw_step_flags(self->model->head.plant, used, self->excluded);
+    out->flags      = 0U;
+    if ((used != self->all) || (self->excluded != 0U)) {
+        out->flags = blw_step_flags(self->model->head.plant, used, self->excluded);
+    }
     if (self->warm_up > 0U) {
         self->warm_up--;
         out->flags = (uint8_t)(out->flags | BLW_FLAG_WARMING_UP);
@@ -286,9 +296,6 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
     out->bound     = BLW_R(0.0);
     out->outcome   = (uint8_t)BLW_OUTCOME_KALMAN;
     if (largest <= (model->k * model->k)) {
-        for (size_t i = 0U; i < model->head.plant->m; i++) {
-            self->h[i] = blw_la_sqrt(self->h[i]);
-        }
         fuse(self, self->e);
         return;
     }
@@ -297,24 +304,51 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
     fuse(self, self->eta);
 }
 
+/* (1) in the usual case: every sample is there and nothing is near a bound. */
+static bool advance_quickly(blw_guard_t *self, const blw_real_t *u, const blw_real_t *y,
+                            blw_mask_t valid)
+{
+    const blw_guard_model_t *const   model   = self->model;
+    const blw_plant_t *const         plant   = model->head.plant;
+    const blw_guard_advance_kernel_t kernel  = model->advance;
+    const bool                       regular = (y != NULL) && ((u != NULL) || (plant->l == 0U));
+
+    return (kernel != NULL) && regular && (valid == self->all)
+           && kernel(u, y, self->x_ref, self->eta, self->x_bar, self->e);
+}
+
+/* (1) in general.  *used: the samples taken in. */
+static blw_status_t advance_checked(blw_guard_t *self, const blw_real_t *u, const blw_real_t *y,
+                                    blw_mask_t valid, blw_mask_t *used)
+{
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+
+    if (status != BLW_OK) {
+        return status;
+    }
+    *used = blw_plant_screen(plant, y, valid);
+    blw_plant_predict(plant, self->x_ref, u, self->x_bar);
+    advance(self, y, *used);
+    return BLW_OK;
+}
+
 blw_status_t blw_guard_step(blw_guard_t *self, const blw_real_t *u, const blw_real_t *y,
                             blw_mask_t valid, blw_estimator_out_t *out)
 {
     if ((self == NULL) || (out == NULL)) {
         return BLW_ERR_ARG;
     }
-    const blw_plant_t *const plant  = self->model->head.plant;
-    const blw_status_t       status = blw_step_check(plant, u, y, valid);
-    if (status != BLW_OK) {
-        return status;
+    blw_mask_t used = valid;
+    if (!advance_quickly(self, u, y, valid)) {
+        const blw_status_t status = advance_checked(self, u, y, valid, &used);
+        if (status != BLW_OK) {
+            return status;
+        }
     }
-    blw_mask_t used = blw_plant_screen(plant, y, valid);
-
-    blw_plant_predict(plant, self->x_ref, u, self->x_bar);
-    advance(self, y, used);
     decide(self, &used, out);
     judge_sensors(self, used);
-    if (!blw_la_bounded(plant->n, self->x_hat)) {
+    if (!blw_la_bounded(self->model->head.plant->n, self->x_hat)) {
         restart(self);
         used = 0U;
     }

@@ -18,11 +18,14 @@ void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau
     const blw_real_t *S   = model->S;
     size_t            row = 0U;
 
+    if (model->multiply != NULL) {
+        model->multiply(tau, l);
+        return;
+    }
     for (size_t i = 0U; i < m; i++) {
-        const size_t checked = model->rank[i];
-
-        for (size_t a = 0U; a < r; a++) { /* S_ii = diag(I, 0) */
-            l[row + a] = (a < checked) ? tau[row + a] : BLW_R(0.0);
+        blw_la_copy(model->rank[i], &tau[row], &l[row]); /* S_ii = diag(I, 0) */
+        for (size_t a = model->rank[i]; a < r; a++) {
+            l[row + a] = BLW_R(0.0);
         }
         guard_both(r, row, S, &tau[row], tau, &l[row], l);
         S += r * row;
@@ -42,11 +45,35 @@ void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step)
         tau[a] += step[a];
         l[a] += step[a];
     }
+    if (model->move != NULL) {
+        model->move(i, step, self->l);
+        return;
+    }
     if (i > 0U) {
         guard_mul_t(r, i * r, 0U, i * r, rows_of(model, i), step, self->l, self->l);
     }
     for (size_t j = i + 1U; j < m; j++) {
         guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &self->l[j * r]);
+    }
+}
+
+void blw_guard_squares(const blw_guard_model_t *model, const blw_real_t *l, blw_real_t *squares)
+{
+    const size_t r = model->r;
+    const size_t m = model->head.plant->m;
+
+    if (model->squares != NULL) {
+        model->squares(l, squares);
+        return;
+    }
+    for (size_t i = 0U; i < m; i++) {
+        blw_real_t sum = l[0] * l[0];
+
+        for (size_t a = 1U; a < r; a++) {
+            sum += l[a] * l[a];
+        }
+        squares[i] = sum;
+        l += r;
     }
 }
 

@@ -7,6 +7,8 @@
 
 /** l = S tau, every row. */
 void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau, blw_real_t *l);
+/** squares [m] = |l_i|^2 */
+void blw_guard_squares(const blw_guard_model_t *model, const blw_real_t *l, blw_real_t *squares);
 /** Add `step` [r] to tau_i, and S_ji step to l_j for all sensors j. */
 void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step);
 /** y = S_ij x, i /= j */

@@ -29,6 +29,10 @@
  * many times the largest |step|. */
 #define CLEAR BLW_R(8.0)
 
+/* A sensor is excluded at once if its |h_i| is larger than all others and than the threshold by this
+ * many times k. */
+#define AT_ONCE BLW_R(4.0)
+
 typedef struct descent {
     blw_real_t pending; /* sum over the sensors of effect_i |step_i| */
     blw_real_t largest; /* largest |step_i| */
@@ -37,6 +41,7 @@ typedef struct descent {
     unsigned   repeats; /* updates of sensors that had had one */
     bool       gross;   /* l may hold the rounding of a gross attack */
     bool       decides; /* ends as soon as it is clear which units to exclude */
+    bool       fresh;   /* the survey is up to date */
 } descent_t;
 
 /* s of (7) from |h_i|. */
@@ -45,55 +50,67 @@ static blw_real_t shrink(blw_real_t h, blw_real_t k)
     return (h > k) ? (k / h) : BLW_R(1.0);
 }
 
-/* |step| of (7) for a sensor with nu_i /= 0 from its l, e and tau [r]; also |h_i|. */
+/* |step| of (7) for a sensor with nu_i /= 0 from its l, e and tau [r]; also h_i and its length. */
 static blw_real_t attacked_step(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
-                                const blw_real_t *tau, blw_real_t *length)
+                                const blw_real_t *tau, blw_real_t *h, blw_real_t *length)
 {
     blw_real_t sum = BLW_R(0.0);
 
     for (size_t a = 0U; a < r; a++) {
-        const blw_real_t h = l[a] + (e[a] - tau[a]);
-        sum += h * h;
+        h[a] = l[a] + (e[a] - tau[a]);
+        sum += h[a] * h[a];
     }
     *length            = blw_la_sqrt(sum);
     const blw_real_t s = shrink(*length, k);
     sum                = BLW_R(0.0);
     for (size_t a = 0U; a < r; a++) {
-        const blw_real_t step = (s * (l[a] + (e[a] - tau[a]))) - l[a];
+        const blw_real_t step = (s * h[a]) - l[a];
         sum += step * step;
     }
     return blw_la_sqrt(sum);
 }
 
-/* All |h_i|, and the largest step. */
+static void note_step(descent_t *descent, size_t i, blw_real_t length)
+{
+    if (length > descent->largest) {
+        descent->largest = length;
+        descent->sensor  = i;
+    }
+}
+
+/* All |h_i|, and the largest step.  What the first loop says of a sensor with nu_i /= 0 or k_i = 0 is
+ * less than its step, which the second finds. */
 static void survey(blw_guard_t *self, descent_t *descent)
 {
     const blw_guard_model_t *const model    = self->model;
     const size_t                   r        = model->r;
     const size_t                   m        = model->head.plant->m;
-    blw_mask_t                     attacked = self->attacked;
+    const blw_real_t               k        = model->k;
     blw_mask_t                     excluded = self->excluded;
     size_t                         row      = 0U;
 
     descent->pending = BLW_R(0.0);
     descent->largest = BLW_R(0.0);
+    blw_guard_squares(model, self->l, self->h);
     for (size_t i = 0U; i < m; i++) {
-        const blw_real_t k      = ((excluded & 1U) != 0U) ? BLW_R(0.0) : model->k;
-        blw_real_t       length = BLW_R(0.0);
+        const blw_real_t h = blw_la_sqrt(self->h[i]);
 
-        if ((attacked & 1U) != 0U) {
-            length =
-                attacked_step(r, k, &self->l[row], &self->e[row], &self->eta[row], &self->h[i]);
-        } else { /* h = l */
-            self->h[i] = blw_la_norm(r, &self->l[row]);
-            length     = blw_la_max(BLW_R(0.0), self->h[i] - k);
+        self->h[i] = h;
+        if (h > k) {
+            descent->pending += model->effect[i] * (h - k);
+            note_step(descent, i, h - k);
         }
-        descent->pending += model->effect[i] * length;
-        if (length > descent->largest) {
-            descent->largest = length;
-            descent->sensor  = i;
+    }
+    for (blw_mask_t rest = self->attacked | excluded; rest != 0U; rest >>= 1) {
+        if ((rest & 1U) != 0U) {
+            const size_t     i      = row / r;
+            const blw_real_t limit  = ((excluded & 1U) != 0U) ? BLW_R(0.0) : k;
+            const blw_real_t length = attacked_step(r, limit, &self->l[row], &self->e[row],
+                                                    &self->eta[row], self->step, &self->h[i]);
+
+            descent->pending += model->effect[i] * length;
+            note_step(descent, i, length);
         }
-        attacked >>= 1;
         excluded >>= 1;
         row += r;
     }
@@ -187,36 +204,55 @@ static bool update(blw_guard_t *self, descent_t *descent)
     return true;
 }
 
+/* The largest |h_i| of the sensors outside a set, and whose it is. */
+static blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
+{
+    const size_t m       = self->model->head.plant->m;
+    blw_real_t   largest = BLW_R(0.0);
+
+    for (size_t i = 0U; i < m; i++) {
+        if ((self->h[i] > largest) && !guard_has(set, i)) {
+            largest = self->h[i];
+            *sensor = i;
+        }
+    }
+    return largest;
+}
+
+/* Sensors of the unit of sensor i. */
+static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
+{
+    const size_t m   = model->head.plant->m;
+    blw_mask_t   set = guard_bit(i);
+
+    for (size_t j = 0U; (model->n_units < m) && (j < m); j++) {
+        set |= (model->unit[j] == model->unit[i]) ? guard_bit(j) : 0U;
+    }
+    return set;
+}
+
 /* The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
  * `margin` would not change the choice. */
 static blw_mask_t choose_excluded(const blw_guard_t *self, blw_real_t margin, bool *clear)
 {
     const blw_guard_model_t *const model  = self->model;
-    const size_t                   m      = model->head.plant->m;
+    const size_t                   p      = model->head.plant->p;
     blw_mask_t                     chosen = 0U;
+    size_t                         sensor = 0U;
     blw_real_t                     last   = BLW_REAL_MAX;
 
-    *clear = true;
-    for (size_t taken = 0U; taken <= model->head.plant->p; taken++) {
-        blw_real_t largest = BLW_R(0.0);
-        size_t     sensor  = 0U;
+    for (size_t taken = 0U; taken < p; taken++) {
+        const blw_real_t largest = largest_outside(self, chosen, &sensor);
 
-        for (size_t i = 0U; i < m; i++) {
-            if ((self->h[i] > largest) && !guard_has(chosen, i)) {
-                largest = self->h[i];
-                sensor  = i;
-            }
+        if (!(largest > model->exclude)) {
+            *clear = false;
+            return chosen;
         }
-        if ((taken == model->head.plant->p) || !(largest > model->exclude)) {
-            *clear = *clear && (taken == model->head.plant->p) && ((last - largest) > margin);
-            break;
-        }
-        *clear = *clear && (largest > (model->exclude + margin));
-        last   = largest;
-        for (size_t i = 0U; i < m; i++) {
-            chosen |= (model->unit[i] == model->unit[sensor]) ? guard_bit(i) : 0U;
-        }
+        last = largest;
+        chosen |= unit_of(model, sensor);
     }
+    *clear = (last > (model->exclude + margin))
+             && ((last - largest_outside(self, chosen, &sensor)) > margin);
     return chosen;
 }
 
@@ -231,7 +267,10 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
     descent->limit   = limit;
     descent->repeats = 0U;
     for (;;) {
-        survey(self, descent);
+        if (!descent->fresh) {
+            survey(self, descent);
+        }
+        descent->fresh   = false;
         const bool still = descent->largest <= (TOLERANCE * k);
         if (still && descent->gross && !renewed) {
             blw_guard_multipliers(self->model, self->eta, self->l);
@@ -265,20 +304,14 @@ static void eliminate(blw_guard_t *self)
     }
 }
 
-/* Solve on without the sensors of a set.  After a gross attack its rounding is removed from l first:
- * where tau_I starts makes no difference, so it starts from 0.  Unless pairs keep l_I = 0 all the
- * time, the work for that is kept back, since (8) would not hold otherwise. */
-static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, descent_t *descent)
+/* Set k_I = 0 for a set of sensors I, and l_I to 0.  After a gross attack its rounding is removed from
+ * l first: where tau_I starts makes no difference, so it starts from 0. */
+static void exclude(blw_guard_t *self, blw_mask_t set, descent_t *descent)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   r     = model->r;
-    const unsigned                 cost  = cost_of(self, set);
-    const unsigned                 kept  = (model->pairs != 0U) ? 0U : cost;
 
-    self->excluded = ((self->updates + cost) > limit) ? 0U : set;
-    if (self->excluded == 0U) {
-        return false;
-    }
+    self->excluded = set;
     for (size_t i = 0U; descent->gross && (i < model->head.plant->m); i++) {
         if (guard_has(set, i)) {
             blw_la_fill(r, BLW_R(0.0), &self->eta[i * r]);
@@ -287,14 +320,55 @@ static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, d
     if (descent->gross) {
         blw_guard_multipliers(model, self->eta, self->l);
     }
-    descent->gross   = false;
-    descent->decides = false;
+    descent->gross = false;
     eliminate(self);
+}
+
+/* Solve on without the sensors of a set.  Unless pairs keep l_I = 0 all the time, the work for that
+ * is kept back, since (8) would not hold otherwise. */
+static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, descent_t *descent)
+{
+    const unsigned cost = cost_of(self, set);
+    const unsigned kept = (self->model->pairs != 0U) ? 0U : cost;
+
+    if (set != self->excluded) {
+        if ((self->updates + cost) > limit) {
+            self->excluded = 0U;
+            return false;
+        }
+        exclude(self, set, descent);
+    }
+    descent->decides     = false;
     const bool converged = descend(self, limit - kept, descent);
     if (!converged && (kept > 0U)) {
         eliminate(self);
     }
     return converged;
+}
+
+/* Exclude the sensor with the largest step at once if it stands out so far that the first descent
+ * would end with that; else leave the choice to that descent, which may start from anywhere. */
+static void exclude_at_once(blw_guard_t *self, descent_t *descent)
+{
+    const blw_guard_model_t *const model  = self->model;
+    const blw_real_t               margin = AT_ONCE * model->k;
+    size_t                         i      = 0U;
+
+    survey(self, descent);
+    descent->fresh = true;
+    if ((model->pairs == 0U) || !descent->decides
+        || !(descent->largest > (model->exclude + margin))) {
+        return;
+    }
+    const size_t chosen = descent->sensor;
+    descent->gross      = descent->largest > (GROSS * model->k);
+    exclude(self, guard_bit(chosen), descent);
+    survey(self, descent);
+    const blw_real_t others = blw_la_max(model->exclude, largest_outside(self, self->excluded, &i));
+    if (!((self->h[chosen] - others) > margin)) {
+        self->excluded = 0U;
+        descent->fresh = false;
+    }
 }
 
 /* (9); BLW_REAL_MAX if there is none. */
@@ -331,31 +405,49 @@ static blw_real_t bound_of(const blw_guard_t *self)
     return (!none && (most <= BLW_REAL_MAX)) ? most : BLW_REAL_MAX;
 }
 
+/* The first descent, and what it excludes.  @return that set. */
+static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *descent,
+                                bool *converged)
+{
+    const unsigned most  = self->model->max_updates;
+    blw_mask_t     set   = 0U;
+    bool           clear = false;
+
+    exclude_at_once(self, descent);
+    if (self->excluded != 0U) {
+        return self->excluded;
+    }
+    *converged = descend(self, descent->decides ? limit : most, descent);
+    if (descent->decides) {
+        set = choose_excluded(self, BLW_R(0.0), &clear);
+    }
+    if ((set == 0U) && !*converged) {
+        descent->decides = false;
+        *converged       = descend(self, most, descent);
+    }
+    return set;
+}
+
 blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
+    const bool                     search  = model->search != 0U;
     const size_t                   N       = (size_t)model->head.plant->m * model->r;
     const unsigned                 most    = model->max_updates;
-    const unsigned                 part    = (model->search != 0U) ? (most / 4U) : (most / 2U);
     descent_t                      descent = {.decides = self->warm_up == 0U};
-    bool                           clear   = false;
 
     blw_la_copy(N, self->e, self->eta);
-    *converged           = descend(self, descent.decides ? part : most, &descent);
-    const blw_mask_t set = (self->warm_up > 0U) ? 0U : choose_excluded(self, BLW_R(0.0), &clear);
-    if ((set == 0U) && !*converged) {
-        descent.decides = false;
-        *converged      = descend(self, most, &descent);
-    }
+    const blw_mask_t set =
+        find_excluded(self, search ? (most / 4U) : (most / 2U), &descent, converged);
     if (set != 0U) {
-        *converged =
-            descend_without(self, set, (model->search != 0U) ? (most / 2U) : most, &descent);
+        *converged = descend_without(self, set, search ? (most / 2U) : most, &descent);
     }
     const bool unexplained = (self->attacked & ~self->excluded) != 0U;
-    if ((set != 0U) && unexplained && (model->search != 0U)) {
+    if ((set != 0U) && unexplained && search) {
         blw_la_copy(N, self->e, self->eta);
         blw_guard_multipliers(model, self->eta, self->l);
         self->attacked = 0U;
+        self->excluded = 0U;
         *converged     = descend_without(self, blw_guard_search(self), most, &descent);
     }
     return *converged ? descent.pending : bound_of(self);

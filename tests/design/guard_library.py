@@ -56,14 +56,16 @@ def layouts(real: type) -> dict[str, type]:
                     + [(k, ct.POINTER(word)) for k in ("unit", "rank")]
                     + [(k, pointer) for k in ("Lam", "b", "S", "V", "s", "Fu", "Gu", "Xu",
                                               "Xs", "Sig", "effect", "drift")]
-                    + [(k, real) for k in ("k", "exclude", "gain", "kappa", "omega", "sigma")])
+                    + [(k, real) for k in ("k", "exclude", "gain", "kappa", "omega", "sigma")]
+                    + [(k, ct.c_void_p) for k in ("advance", "multiply", "squares", "average",
+                                                 "fuse", "move")])
 
     class Guard(ct.Structure):
         _fields_ = ([("ops", ct.c_void_p), ("model", ct.c_void_p)]
                     + [(k, pointer) for k in ("eta", "e", "l", "average", "h", "suspicion",
                                               "x_bar", "x_ref", "x_hat", "d", "step", "turned",
                                               "L")]
-                    + [(k, ct.c_uint64) for k in ("attacked", "excluded")]
+                    + [(k, ct.c_uint64) for k in ("all", "attacked", "excluded")]
                     + [(k, word) for k in ("updates", "warm_up")])
 
     class Out(ct.Structure):

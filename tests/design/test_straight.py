@@ -74,8 +74,11 @@ PARTS = {
     "kalman": "bare = blw_NAME_kalman; bare.step = NULL;",
     "lasso": """static blw_jordan_model_t filters;
     bare = blw_NAME_lasso; filters = *bare.jordan; filters.step = NULL; bare.jordan = &filters;""",
+    "guard": """bare = blw_NAME_guard; bare.advance = NULL; bare.multiply = NULL; bare.move = NULL;
+    bare.squares = NULL; bare.average = NULL; bare.fuse = NULL;""",
 }
-KERNEL = {"kalman": "blw_NAME_kalman.step != NULL", "lasso": "blw_NAME_lasso.jordan->step != NULL"}
+KERNEL = {"kalman": "blw_NAME_kalman.step != NULL", "lasso": "blw_NAME_lasso.jordan->step != NULL",
+          "guard": "blw_NAME_guard.advance != NULL"}
 
 
 def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
@@ -91,7 +94,8 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     text = text.replace(f"BLW_{name.upper()}_{method}_", f"BLW_{name.upper()}_{method.upper()}_")
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
-               "l1_support"]
+               "l1_support", "guard", "guard_S", "guard_beside", "guard_check", "guard_search",
+               "guard_solve"]
     sources = [ROOT / "lib" / "src" / f"blw_{module}.c" for module in modules]
     subprocess.run(["gcc", "-std=c99", "-O1", "-ffp-contract=off", *WIDTHS[width],
                     f"-I{ROOT / 'lib' / 'include'}", *sources, folder / f"{name}_model.c",
@@ -104,7 +108,7 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
                                          ("drone6", "f32")])
 def test_kernel_given_any_data_has_the_bits_of_the_loops(tmp_path, name, width, method):
     plant = model.load(MODELS / f"{name}.toml")
-    made = design.design_all(plant, ["kalman", "lasso"])
+    made = design.design_all(plant, ["kalman", "lasso", "guard"])
     assert compare(tmp_path, made, method, width) == "0 1\n"
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import guard_fusion, guard_order, margin
+from blw import guard_fusion, guard_order, guard_straight, margin
 from blw.design import Designed
 from blw.errors import DesignError, ModelError
 from blw.guard_filters import Filters, filters
@@ -45,7 +45,7 @@ DRIFT_SIGMAS = 5.0
 
 #: Block updates per step and attacked unit, and where less than RARE_CLIPPING of the benign steps
 #: need none.
-UPDATES = 12
+UPDATES = 6
 UPDATES_IF_OFTEN = 100
 RARE_CLIPPING = 0.95
 
@@ -89,7 +89,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         **filter_figures(model, kalman, bank, fusion),
         **guard_order.curve(model, poles, bank),
     }
-    tables = struct(model, bank, fusion, limits)
+    tables = struct(model, kalman, bank, fusion, limits)
     return Designed(tables, info, mem=(model.n, model.m, bank.r, newton_sensors(model)))
 
 
@@ -135,7 +135,9 @@ def choose_limits(
     )
 
 
-def struct(model: Model, bank: Filters, fusion: Fusion, limits: Limits) -> Struct:
+def struct(
+    model: Model, kalman: Kalman, bank: Filters, fusion: Fusion, limits: Limits
+) -> Struct:
     """Tables blw_guard_model_t."""
     sets = guard_fusion.unit_sets(model.units, model.p)
     pairs = guard_order.pair_reals(model, bank.r) > 0
@@ -160,6 +162,12 @@ def struct(model: Model, bank: Filters, fusion: Fusion, limits: Limits) -> Struc
         "kappa": real(guard_fusion.kappa(fusion, bank.split.Xu, sets)),
         "omega": real(np.sqrt(model.m) * norm(fusion.W @ fusion.Z)),
         "sigma": real(norm(bank.split.Xs @ fusion.Sig @ fusion.Z)),
+        "advance": guard_straight.advance(model, kalman, fusion),
+        "multiply": guard_straight.multiply(fusion),
+        "squares": guard_straight.squares(model.m, bank.r),
+        "average": guard_straight.average(model.m, bank.r, DRIFT_GAIN),
+        "fuse": guard_straight.fuse(fusion, model.n),
+        "move": guard_straight.move(fusion),
     }, method=NAME)
 
 

@@ -38,28 +38,28 @@ def kalman_step(model: Model, kalman: "Kalman") -> Code | None:
     """blw_kalman_kernel_t of a plant, or None where loops serve it better."""
     n, m, l = model.n, model.m, model.l
     terms = n * (n + l + 2 * m)
-    limit = _quick_limit(model, kalman)
+    limit = quick_limit(model, kalman)
     if terms > MOST_TERMS or limit is None:
         return None
-    A, Bu, C, K = (_flushed(matrix) for matrix in (model.A, model.Bu, model.C, kalman.K))
-    offset = _flushed(model.offset)
-    x, u, y = _names("x", n), _names("u", l), _names("y", m)
-    lines = [*_loads("x_hat", x), *_loads("u", u), *_loads("y", y)]
+    A, Bu, C, K = (flushed(matrix) for matrix in (model.A, model.Bu, model.C, kalman.K))
+    offset = flushed(model.offset)
+    x, u, y = names("x", n), names("u", l), names("y", m)
+    lines = [*loads("x_hat", x), *loads("u", u), *loads("y", y)]
     squares = " + ".join(f"({v} * {v})" for v in (*x, *u, *y))
-    lines += _statement("const blw_real_t size2 =", f"{squares};")
-    lines += ["", f"if (!(size2 <= {_real(limit**2)})) {{", "    return false;", "}"]
+    lines += statement("const blw_real_t size2 =", f"{squares};")
+    lines += ["", f"if (!(size2 <= {real(limit**2)})) {{", "    return false;", "}"]
     for i in range(n):
-        terms_u = _sum(Bu[i], u) if l else ""
+        terms_u = total(Bu[i], u) if l else ""
         known = f" + ({terms_u})" if terms_u else ""
-        lines += _statement(f"const blw_real_t p{i} =",
-                            f"(BLW_R(0.0){_tail(A[i], x)}){known};")
+        lines += statement(f"const blw_real_t p{i} =",
+                            f"(BLW_R(0.0){tail(A[i], x)}){known};")
     for i in range(m):
-        sample = f"(y{i}{_tail(-offset[i:i + 1], ['1'])})" if offset[i] else f"y{i}"
-        expected = _sum(C[i], _names("p", n))
-        lines += _statement(f"const blw_real_t e{i} =",
+        sample = f"(y{i}{tail(-offset[i:i + 1], ['1'])})" if offset[i] else f"y{i}"
+        expected = total(C[i], names("p", n))
+        lines += statement(f"const blw_real_t e{i} =",
                             f"{sample} - ({expected});" if expected else f"{sample};")
     for j in range(n):
-        lines += _statement(f"x_hat[{j}] =", f"p{j}{_tail(K[j], _names('e', m))};")
+        lines += statement(f"x_hat[{j}] =", f"p{j}{tail(K[j], names('e', m))};")
     lines.append("return true;")
     comment = (f"x_hat from k-1 to k: {_count(A, Bu, C, K)} multiply-adds of {terms}, the rest are "
                "zeros")
@@ -73,22 +73,22 @@ def jordan_step(J: Array, b: Array, D: Array) -> Code | None:
     r, (N, l) = len(J), D.shape
     if N * (2 + l) > MOST_TERMS:
         return None
-    J, b, D = _flushed(J), _flushed(b), _flushed(D)
-    z, y, u = _names("z", N), _names("y", N // r), _names("u", l)
+    J, b, D = flushed(J), flushed(b), flushed(D)
+    z, y, u = names("z", N), names("y", N // r), names("u", l)
     bands = (0, 1, 2, -1)  # the order of the sum in blw_jordan_step_sensor()
     state = [f"zeta[{i}]" for i in range(N)]
-    lines = [*_loads("y", y)]
+    lines = [*loads("y", y)]
     for i in range(N):
         row, start = i % r, i - i % r
         at = [row + band for band in bands if 0 <= row + band < r]
         factors = np.append(J[row, at], b[i])
-        value = _sum(factors, [*(state[start + column] for column in at), y[i // r]])
-        lines += _statement(f"blw_real_t {z[i]} =", f"{value or 'BLW_R(0.0)'};")
+        value = total(factors, [*(state[start + column] for column in at), y[i // r]])
+        lines += statement(f"blw_real_t {z[i]} =", f"{value or 'BLW_R(0.0)'};")
     if l:
-        lines += ["", "if (u != NULL) {", *(f"    {line}" for line in _loads("u", u))]
+        lines += ["", "if (u != NULL) {", *(f"    {line}" for line in loads("u", u))]
         for i in range(N):
-            if value := _sum(D[i], u):
-                lines += [f"    {line}" for line in _statement(f"{z[i]} +=", f"{value};")]
+            if value := total(D[i], u):
+                lines += [f"    {line}" for line in statement(f"{z[i]} +=", f"{value};")]
         lines.append("}")
     lines += [f"{state[i]} = {z[i]};" for i in range(N)]
     unused = [] if l else ["(void)u;"]
@@ -97,7 +97,7 @@ def jordan_step(J: Array, b: Array, D: Array) -> Code | None:
                 tuple(unused + lines), comment)
 
 
-def _quick_limit(model: Model, kalman: "Kalman") -> float | None:
+def quick_limit(model: Model, kalman: "Kalman") -> float | None:
     """|(x, u, y)|_2 below which no sample can leave its range and no state its bound."""
     plant: dict[str, Any] = plant_tables(model, kalman).to_json()
     edges = np.minimum(-np.array(plant["y_min"]), np.array(plant["y_max"]))
@@ -113,47 +113,47 @@ def _quick_limit(model: Model, kalman: "Kalman") -> float | None:
     return limit
 
 
-def _flushed(matrix: Array) -> Array:
+def flushed(matrix: Array) -> Array:
     """As tables.table() stores it: so that what is zero there is zero here."""
     values = np.asarray(matrix, dtype=float)
     return np.where(np.abs(values) < float(FLOAT32.tiny), 0.0, values)
 
 
-def _names(letter: str, count: int) -> list[str]:
+def names(letter: str, count: int) -> list[str]:
     return [f"{letter}{i}" for i in range(count)]
 
 
-def _loads(array: str, names: Iterable[str]) -> list[str]:
+def loads(array: str, names: Iterable[str]) -> list[str]:
     return [f"const blw_real_t {name} = {array}[{i}];" for i, name in enumerate(names)]
 
 
-def _real(x: float) -> str:
+def real(x: float) -> str:
     return f"BLW_R({literal(x)})"
 
 
 def _product(factor: float, name: str) -> str:
     if name == "1":
-        return _real(factor)
-    return name if factor == 1.0 else f"({_real(factor)} * {name})"
+        return real(factor)
+    return name if factor == 1.0 else f"({real(factor)} * {name})"
 
 
-def _tail(factors: Array, names: Sequence[str]) -> str:
+def tail(factors: Array, names: Sequence[str]) -> str:
     """" + (a * x) - (b * y)": the terms of a sum that goes on."""
     return "".join(f" {'-' if a < 0.0 else '+'} {_product(abs(a), name)}"
                    for a, name in zip(factors.tolist(), names, strict=True) if a)
 
 
-def _sum(factors: Array, names: Sequence[str]) -> str:
+def total(factors: Array, names: Sequence[str]) -> str:
     """The same from its first term on; empty if all factors are zero."""
     first = next((i for i, a in enumerate(factors.tolist()) if a), None)
     if first is None:
         return ""
     a = float(factors[first])
     lead = f"-{names[first]}" if a == -1.0 else _product(a, names[first])
-    return lead + _tail(factors[first + 1:], names[first + 1:])
+    return lead + tail(factors[first + 1:], names[first + 1:])
 
 
-def _statement(left: str, right: str) -> list[str]:
+def statement(left: str, right: str) -> list[str]:
     """left right, wrapped."""
     return textwrap.wrap(f"{left} {right}", WIDTH, subsequent_indent="    ")
 

@@ -33,6 +33,28 @@
 extern "C" {
 #endif
 
+/* Straight-line code that the design tool writes for small models: the same bits as the loops. */
+
+/** x_bar and e of (1) from u [l], y [m], all valid, x_ref and eta.  @return false with nothing changed
+ *  unless u, y and x_ref are so small that no bound and no range can be exceeded, which also refuses
+ *  NaN. */
+typedef bool (*blw_guard_advance_kernel_t)(const blw_real_t *u, const blw_real_t *y,
+                                           const blw_real_t *x_ref, const blw_real_t *eta,
+                                           blw_real_t *x_bar, blw_real_t *e);
+/** l = S tau */
+typedef void (*blw_guard_multiply_kernel_t)(const blw_real_t *tau, blw_real_t *l);
+/** squares [m] = |l_i|^2 */
+typedef void (*blw_guard_squares_kernel_t)(const blw_real_t *l, blw_real_t *squares);
+/** average += gain (l - average), squares [m] = |average_i|^2 */
+typedef void (*blw_guard_average_kernel_t)(const blw_real_t *l, blw_real_t *average,
+                                           blw_real_t *squares);
+/** x_ref of (4) and eta of (5) where all modes are fused securely. */
+typedef void (*blw_guard_fuse_kernel_t)(const blw_real_t *tau, const blw_real_t *e,
+                                        const blw_real_t *x_bar, blw_real_t *x_ref,
+                                        blw_real_t *eta);
+/** l_j += S_ji step for all sensors j but i. */
+typedef void (*blw_guard_move_kernel_t)(size_t i, const blw_real_t *step, blw_real_t *l);
+
 typedef struct blw_guard_model {
     blw_model_t       head;
     uint8_t           r;           /**< local states per sensor, >= 1 */
@@ -69,6 +91,12 @@ typedef struct blw_guard_model {
                                         out of the sum; 0 if there is no such number */
     blw_real_t        omega;   /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
     blw_real_t        sigma;   /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
+    blw_guard_advance_kernel_t  advance; /**< all four may be NULL */
+    blw_guard_multiply_kernel_t multiply;
+    blw_guard_squares_kernel_t  squares;
+    blw_guard_average_kernel_t  average;
+    blw_guard_fuse_kernel_t     fuse; /**< NULL if n_u < n */
+    blw_guard_move_kernel_t     move;
 } blw_guard_model_t;
 
 /** Estimator state.  The caller owns it; the members are private. */
@@ -88,6 +116,7 @@ typedef struct blw_guard {
     blw_real_t              *step;      /* [most r] change of tau */
     blw_real_t              *turned;    /* [3 r] of one sensor, in the coordinates of V */
     blw_real_t              *L;         /* packed lower: factor of a part of S */
+    blw_mask_t               all;       /* every sensor */
     blw_mask_t               attacked;  /* sensors with nu_i /= 0 */
     blw_mask_t               excluded;  /* sensors with k_i = 0 */
     uint16_t                 updates;   /* block updates in this step */
