@@ -6,14 +6,18 @@ set(BLW_UNITY_DIR "${PROJECT_SOURCE_DIR}/build/unity" CACHE PATH "Folder of unit
 function(blw_unity_from directory)
   add_library(blw_unity STATIC ${directory}/unity.c)
   target_include_directories(blw_unity SYSTEM PUBLIC ${directory})
-  target_compile_definitions(blw_unity PUBLIC UNITY_INCLUDE_DOUBLE)
+  target_compile_definitions(blw_unity PUBLIC UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
+  if(CMAKE_CROSSCOMPILING) # to the host's console; no stdio, which a small target cannot hold
+    target_compile_definitions(blw_unity PUBLIC
+      UNITY_OUTPUT_CHAR=host_io_putc "UNITY_OUTPUT_CHAR_HEADER_DECLARATION=host_io_putc(int)")
+  endif()
 endfunction()
 
 find_package(unity QUIET)
 if(TARGET unity::framework)
   add_library(blw_unity INTERFACE)
   target_link_libraries(blw_unity INTERFACE unity::framework)
-  target_compile_definitions(blw_unity INTERFACE UNITY_INCLUDE_DOUBLE)
+  target_compile_definitions(blw_unity INTERFACE UNITY_INCLUDE_DOUBLE UNITY_SUPPORT_64)
 elseif(EXISTS "${BLW_UNITY_DIR}/unity.c")
   blw_unity_from("${BLW_UNITY_DIR}")
 else()

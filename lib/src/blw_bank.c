@@ -315,24 +315,25 @@ static size_t ops_mem_len(const blw_model_t *model)
     if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_BANK) || (model->plant == NULL)) {
         return 0U;
     }
-    return mem_len_of((const blw_bank_model_t *)model);
+    return mem_len_of((const blw_bank_model_t *)(const void *)model);
 }
 
 static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
                              size_t mem_len)
 {
-    return blw_bank_init((blw_bank_t *)self, (const blw_bank_model_t *)model, mem, mem_len);
+    return blw_bank_init((blw_bank_t *)(void *)self, (const blw_bank_model_t *)(const void *)model,
+                         mem, mem_len);
 }
 
 static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
-    return blw_bank_reset((blw_bank_t *)self, x0);
+    return blw_bank_reset((blw_bank_t *)(void *)self, x0);
 }
 
 static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
                              blw_mask_t valid, blw_estimator_out_t *out)
 {
-    return blw_bank_step((blw_bank_t *)self, u, y, valid, out);
+    return blw_bank_step((blw_bank_t *)(void *)self, u, y, valid, out);
 }
 
 const blw_estimator_ops_t blw_bank_ops = {

@@ -225,7 +225,7 @@ blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_re
 
 static size_t ops_mem_len(const blw_model_t *model)
 {
-    const blw_lasso_model_t *const lasso = (const blw_lasso_model_t *)model;
+    const blw_lasso_model_t *const lasso = (const blw_lasso_model_t *)(const void *)model;
 
     if ((model == NULL) || (model->plant == NULL)
         || ((model->method != (uint8_t)BLW_METHOD_LASSO)
@@ -238,18 +238,19 @@ static size_t ops_mem_len(const blw_model_t *model)
 static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
                              size_t mem_len)
 {
-    return blw_lasso_init((blw_lasso_t *)self, (const blw_lasso_model_t *)model, mem, mem_len);
+    return blw_lasso_init((blw_lasso_t *)(void *)self,
+                          (const blw_lasso_model_t *)(const void *)model, mem, mem_len);
 }
 
 static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
-    return blw_lasso_reset((blw_lasso_t *)self, x0);
+    return blw_lasso_reset((blw_lasso_t *)(void *)self, x0);
 }
 
 static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
                              blw_mask_t valid, blw_estimator_out_t *out)
 {
-    return blw_lasso_step((blw_lasso_t *)self, u, y, valid, out);
+    return blw_lasso_step((blw_lasso_t *)(void *)self, u, y, valid, out);
 }
 
 const blw_estimator_ops_t blw_lasso_ops = {

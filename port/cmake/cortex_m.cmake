@@ -11,7 +11,7 @@ set(BLW_LINK_OPTIONS --specs=nano.specs)
 set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY) # there is no start-up code yet
 set(BLW_TOOL_PREFIX arm-none-eabi-)
 set(BLW_START_UP cortex_m)
-foreach(language C CXX)
+foreach(language C CXX ASM)
   set(CMAKE_${language}_FLAGS_INIT "${BLW_CPU_FLAGS} -mthumb -ffunction-sections -fdata-sections")
 endforeach()
 set(CMAKE_CROSSCOMPILING_EMULATOR

@@ -17,18 +17,16 @@ extern uint32_t blw_bss_end[];
 void start_reset(void);
 void start_fault(void);
 
-typedef void (*start_vector_t)(void);
-
 /* Stack pointer, reset, then NMI and the faults; interrupts stay off. */
-__attribute__((section(".vectors"), used)) static const start_vector_t vectors[16] = {
-    (start_vector_t)blw_stack_top,
-    start_reset,
-    start_fault,
-    start_fault,
-    start_fault,
-    start_fault,
-    start_fault,
-    start_fault,
+typedef struct start_vectors {
+    uint32_t *stack;
+    void (*handlers[15])(void);
+} start_vectors_t;
+
+__attribute__((section(".vectors"), used)) static const start_vectors_t vectors = {
+    .stack    = blw_stack_top,
+    .handlers = {start_reset, start_fault, start_fault, start_fault, start_fault, start_fault,
+                 start_fault},
 };
 
 intptr_t semihosting_call(intptr_t operation, const void *parameters)

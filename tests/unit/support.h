@@ -22,6 +22,11 @@
 /* Rounding of a few operations on numbers of magnitude 1 to 100. */
 #define SUPPORT_TOL (64.0 * (double)BLW_REAL_EPS)
 
+/* Steps of an endurance test; the emulated targets, which get the same bits, run fewer. */
+#ifndef SUPPORT_LONG_RUN
+#define SUPPORT_LONG_RUN 1000000U
+#endif
+
 /* As volatile: a constant would be folded, with a warning. */
 extern volatile const blw_real_t support_nan;
 extern volatile const blw_real_t support_inf;

@@ -9,7 +9,7 @@ import fcntl
 import os
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -54,6 +54,16 @@ def build(preset: str) -> Path:
     return folder
 
 
+def build_programs(preset: str, targets: Sequence[str]) -> None:
+    """Build some programs of a preset, without its tests if those were not wanted so far.
+
+    Raises StepFailed.
+    """
+    with _turn(preset):
+        _configure(preset, tests=_has_tests(preset))
+        _make(preset, *targets)
+
+
 def configure(preset: str) -> Path:
     """Configure a preset with its tests; returns its folder.  Raises StepFailed."""
     with _turn(preset):
@@ -75,6 +85,12 @@ def _turn(preset: str) -> Iterator[None]:
         yield
 
 
+def _has_tests(preset: str) -> bool:
+    """The preset was configured with its tests."""
+    cache = BUILD / preset / "CMakeCache.txt"
+    return cache.is_file() and "BLW_TESTS:BOOL=ON" in cache.read_text(encoding="utf-8")
+
+
 def _configure(preset: str, tests: bool) -> None:
     switch = f"-DBLW_TESTS={'ON' if tests else 'OFF'}"
     with log_path(preset).open("w", encoding="utf-8") as log:
@@ -83,8 +99,8 @@ def _configure(preset: str, tests: bool) -> None:
         _fail(preset, "CMake could not configure it")
 
 
-def _make(preset: str, target: str) -> None:
-    command = ["ninja", "-C", str(BUILD / preset), f"-j{os.cpu_count()}", target]
+def _make(preset: str, *targets: str) -> None:
+    command = ["ninja", "-C", str(BUILD / preset), f"-j{os.cpu_count()}", *targets]
     ninja = _start(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     with (
         log_path(preset).open("a", encoding="utf-8") as log,

@@ -14,12 +14,14 @@ import click
 
 from blw import lint
 from blw.build import BUILD, ROOT, StepFailed, build, configure
+from blw.cost.targets import TARGETS
 from blw.errors import BulwarkError
 from blw.options import suggestion
 from blw.tally import Tally
 
 PRESETS = ("host-f32", "host-f64", "asan", "clang-f32")
 SUITES = ("design", "program")
+TARGET = "target"
 LINT = "lint"
 COVERAGE = "coverage"
 MIN_BRANCHES_PERCENT = 97
@@ -32,8 +34,8 @@ Step = Callable[[], Tally]
 def test(labels: tuple[str, ...]) -> int:
     """Run all tests, or those with one of the LABELs.
 
-    Labels: design and program (the Python suites), lint, coverage, and those of the C tests:
-    unit, reference, header, install, archive.
+    Labels: design, program and target (the Python suites; target also runs the C tests in QEMU),
+    lint, coverage, and those of the C tests: unit, reference, header, install, archive.
     """
     total = Tally()
     for name, step in _plan(labels).items():
@@ -44,7 +46,7 @@ def test(labels: tuple[str, ...]) -> int:
 
 def _plan(labels: Sequence[str]) -> dict[str, Step]:
     """The steps that cover the labels, all steps without labels."""
-    own = [*SUITES, LINT, COVERAGE]
+    own = [*SUITES, TARGET, LINT, COVERAGE]
     c_labels = [label for label in labels if label not in own]
     if c_labels:
         _check_known(c_labels, own)
@@ -55,6 +57,9 @@ def _plan(labels: Sequence[str]) -> dict[str, Step]:
                        (LINT, lint.run), (COVERAGE, _coverage)):
         if name in labels or not labels:
             steps[name] = step
+    if TARGET in labels or not labels:
+        steps |= {name: partial(_on_target, name) for name in TARGETS}
+        steps["target"] = partial(_pytest, TARGET)
     return steps
 
 
@@ -87,6 +92,15 @@ def _ctest(preset: str, labels: Sequence[str]) -> Tally:
     if labels:
         command += ["--label-regex", f"^({'|'.join(labels)})$"]
     return _with_junit(command, folder / "ctest.xml", "--output-junit")
+
+
+def _on_target(name: str) -> Tally:
+    """The C tests in QEMU; skipped where the compiler or QEMU is missing."""
+    missing = TARGETS[name].missing()
+    if missing:
+        click.echo(f"{name}: skipped: not installed: {', '.join(missing)}")
+        return Tally(skipped=1)
+    return _ctest(name, ())
 
 
 def _pytest(suite: str) -> Tally:

@@ -46,6 +46,7 @@ CASES = {case.name: case for case in (
     Case("liu5", {"lasso": {"gamma": 0.75}}),
     Case("pendulum"),
     Case("torsion"),
+    Case("grid4"),
     Case("random6"),
     Case("random10"),
 )}

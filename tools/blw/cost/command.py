@@ -23,7 +23,8 @@ Names = tuple[str, ...]
 def _shared_options(command: Callable[..., None]) -> Callable[..., None]:
     for option in reversed((
         click.option("--target", "target_names", multiple=True, metavar="TARGET",
-                     help=f"One of {', '.join(targets.TARGETS)}; may be repeated.  Default: all."),
+                     help=f"One of {', '.join(targets.MEASURABLE)}; may be repeated.  "
+                          f"Default: {', '.join(targets.DEFAULT)}."),
         click.option("--model", "model_names", multiple=True, metavar="MODEL",
                      help=f"One of {', '.join(cases.CASES)}; may be repeated.  Default: all."),
         click.option("--method", "methods", multiple=True, metavar="METHOD",
@@ -73,8 +74,8 @@ def _print(rows: list[dict[str, Any]], plan: measure.Bench, columns: dict[str, s
 
 
 def _table(rows: Iterable[dict[str, Any]], columns: dict[str, str]) -> Iterable[str]:
-    yield (f"{'target':<7}{'model':<10}{'method':<10}"
+    yield (f"{'target':<11}{'model':<10}{'method':<10}"
            + "".join(f"{title:>11}" for title in columns.values()))
     for row in rows:
-        yield (f"{row['target']:<7}{row['model']:<10}{row['method']:<10}"
+        yield (f"{row['target']:<11}{row['model']:<10}{row['method']:<10}"
                + "".join(f"{row[key]:>11,.0f}" for key in columns))

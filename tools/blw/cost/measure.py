@@ -34,13 +34,10 @@ def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str
     refused = [{"model": name, "method": method, "reason": reason}
                for name, one in prepared.items() for method, reason in one.design.refused.items()
                if not methods or method in methods]
-    wanted = [Program(target, name, method) for target in targets
+    wanted = [Program.on(target, name, method) for target in targets
               for name, one in prepared.items() for method in one.design.methods
               if not methods or method in methods]
-    for target in targets:
-        own = [program for program in wanted if program.target is target]
-        if own:
-            programs.build(target, own)
+    programs.build(wanted)
     return Bench(prepared, wanted, refused)
 
 
@@ -66,10 +63,10 @@ def _sizes(program: Program, prepared: Prepared) -> dict[str, Any]:
 
 
 def _row(program: Program, prepared: Prepared) -> dict[str, Any]:
-    records, empty = programs.run(program, prepared)
-    if np.any(records["status"] != 0) or len(records) != len(prepared.log.y):
+    replay = programs.run(program, prepared, counting=True)
+    if np.any(replay.steps["status"] != 0) or len(replay.steps) != len(prepared.log.y):
         raise StepFailed(f"{program.target.name}: {program.name}: a step was refused")
-    counts = programs.instructions(records, empty)
+    counts = replay.instructions(program.target)
     attacked = counts[SETTLING_STEPS + BENIGN_STEPS:]
     benign = counts[SETTLING_STEPS:SETTLING_STEPS + BENIGN_STEPS]
     return {**_sizes(program, prepared),

@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.lib.recfunctions import repack_fields
 from numpy.typing import NDArray
 
-from blw.build import ROOT, StepFailed
-from blw.cost.cases import FOLDER, Prepared
-from blw.cost.targets import ICOUNT, TICKS_PER_INSTRUCTION, Target
+from blw.build import BUILD, ROOT, StepFailed, build_programs
+from blw.cost.cases import Prepared
+from blw.cost.targets import ICOUNT, NS_PER_INSTRUCTION, Target
 
-OPTIMISATION = "-O3"
 QEMU = ROOT / "port" / "qemu.sh"
-REAL = "<f4"
 
 #: Of the empty step that calibrates the counter: it loads BLW_OK and returns.
 EMPTY_STEP = 2
@@ -25,75 +24,83 @@ EMPTY_STEP = 2
 
 @dataclass(frozen=True)
 class Program:
-    """One estimator on one target."""
+    """One estimator on one target, or on the host if target is None (of the preset given then)."""
 
-    target: Target
     model: str
     method: str
+    target: Target | None
+    preset: str
+    variant: str = ""
+
+    @classmethod
+    def on(cls, target: Target, model: str, method: str, variant: str = "") -> "Program":
+        return cls(model, method, target, target.name, variant)
 
     @property
     def name(self) -> str:
-        return f"{self.model}.{self.method}"
+        return f"{self.model}.{self.method}{self.variant}"
 
     @property
-    def elf(self) -> Path:
-        return folder(self.target) / self.name
+    def path(self) -> Path:
+        return BUILD / self.preset / "port" / "replay" / self.name
 
     @property
     def map(self) -> Path:
-        return folder(self.target) / f"{self.name}.map"
+        """What the linker says about it."""
+        return self.path.with_name(f"{self.name}.map")
+
+    @property
+    def real(self) -> str:
+        """NumPy's name of blw_real_t."""
+        return "<f8" if self.preset.endswith("f64") else "<f4"
 
 
-def folder(target: Target) -> Path:
-    """Where the programs of a target are built."""
-    return FOLDER / target.name
+def build(programs: Sequence[Program]) -> None:
+    """Build programs, a preset at a time.  Raises StepFailed."""
+    for preset in dict.fromkeys(program.preset for program in programs):
+        build_programs(preset, [program.name for program in programs if program.preset == preset])
 
 
-def build(target: Target, programs: Sequence[Program]) -> None:
-    """Build programs of one target.  Raises StepFailed."""
-    where = folder(target)
-    log = where.with_suffix(".log")
-    where.mkdir(parents=True, exist_ok=True)
-    # gcc leaves the call graph with the stack of every function beside the object files
-    flags = f"{OPTIMISATION} -DNDEBUG -fcallgraph-info=su,da"
-    configure = ["cmake", "-G", "Ninja", "-S", ROOT / "port" / "replay", "-B", where,
-                 "--toolchain", target.toolchain_file, "-DCMAKE_BUILD_TYPE=Release",
-                 f"-DCMAKE_C_FLAGS_RELEASE={flags}", f"-DBLW_CASES={FOLDER / 'cases'}"]
-    make = ["ninja", "-C", where, f"-j{os.cpu_count()}", *(program.name for program in programs)]
-    with log.open("w", encoding="utf-8") as stream:
-        for command in (configure, make):
-            if subprocess.call(command, stdout=stream, stderr=subprocess.STDOUT) != 0:
-                raise StepFailed(f"target {target.name}: {command[0]} failed, see "
-                                 f"{log.relative_to(ROOT)}")
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """What a replay program wrote: a record per step (port/replay/replay.c), and the ticks that the
+    counter needs for itself around an empty step."""
+
+    steps: NDArray[np.void]
+    empty_ticks: int
+
+    def outputs(self) -> NDArray[np.void]:
+        """All output words of the estimator, that is, the records without the ticks."""
+        names = [name for name in self.steps.dtype.names if name != "ticks"]
+        return repack_fields(self.steps[names])
+
+    def instructions(self, target: Target) -> NDArray[np.int64]:
+        """Executed by every step, from its first to its return, [steps]."""
+        ticks = self.steps["ticks"].astype(np.int64) - self.empty_ticks
+        executed = np.rint(ticks * target.tick_ns / NS_PER_INSTRUCTION)
+        return executed.astype(np.int64) + EMPTY_STEP
 
 
-def run(program: Program, prepared: Prepared) -> NDArray[np.void]:
-    """Replay the log; what the program wrote, a record per step (port/replay/replay.c), with
-    `instructions` instead of ticks.  Raises StepFailed."""
+def run(program: Program, prepared: Prepared, counting: bool = False) -> Replay:
+    """Replay the log of the case, slower if it is to count instructions.  Raises StepFailed."""
+    target = program.target
+    environment = os.environ | {"BLW_QEMU_OPTIONS": ICOUNT if counting else ""}
+    emulator = [QEMU, target.qemu, target.machine] if target else []
     with tempfile.TemporaryDirectory(prefix="bulwark.") as name:
         log, out = Path(name, "log"), Path(name, "out")
-        log.write_bytes(prepared.log.packed(REAL))
-        target = program.target
-        done = subprocess.run([QEMU, target.qemu, target.machine, program.elf, log, out],
-                              env=os.environ | {"BLW_QEMU_OPTIONS": ICOUNT}, capture_output=True,
-                              text=True)
+        log.write_bytes(prepared.log.packed(program.real))
+        done = subprocess.run([*emulator, program.path, log, out], capture_output=True, text=True,
+                              env=environment)
         if done.returncode != 0:
-            raise StepFailed(f"{target.name}: {program.name}: status {done.returncode} "
+            raise StepFailed(f"{program.preset}: {program.name}: status {done.returncode} "
                              + done.stderr.strip())
-        return decode(out.read_bytes(), prepared)
+        return _decode(out.read_bytes(), program.real, prepared)
 
 
-def decode(data: bytes, prepared: Prepared) -> NDArray[np.void]:
-    """Records from what a replay program wrote."""
+def _decode(data: bytes, real: str, prepared: Prepared) -> Replay:
     model = prepared.design.model
-    layout = np.dtype([("ticks", "<u4"), ("status", "<i4"), ("x_hat", REAL, (model.n,)),
-                       ("suspicion", REAL, (model.m,)), ("statistic", REAL), ("threshold", REAL),
-                       ("bound", REAL), ("excluded", "<u8"), ("used", "<u8"),
+    layout = np.dtype([("ticks", "<u4"), ("status", "<i4"), ("x_hat", real, (model.n,)),
+                       ("suspicion", real, (model.m,)), ("statistic", real), ("threshold", real),
+                       ("bound", real), ("excluded", "<u8"), ("used", "<u8"),
                        ("iterations", "<u2"), ("outcome", "u1"), ("flags", "u1")])
-    return np.frombuffer(data, layout, offset=4), int.from_bytes(data[:4], "little")
-
-
-def instructions(records: NDArray[np.void], empty_ticks: int) -> NDArray[np.int64]:
-    """Executed instructions of every step, from its first to its return, [steps]."""
-    ticks = records["ticks"].astype(np.int64) - empty_ticks
-    return np.rint(ticks / TICKS_PER_INSTRUCTION).astype(np.int64) + EMPTY_STEP
+    return Replay(np.frombuffer(data, layout, offset=4), int.from_bytes(data[:4], "little"))

@@ -26,7 +26,7 @@ def flash_bytes(program: Program) -> int:
 
 def ram_bytes(program: Program) -> int:
     """State and memory of the estimator."""
-    listing = subprocess.run([program.target.tools + "nm", "-S", program.elf], check=True,
+    listing = subprocess.run([program.target.tools + "nm", "-S", program.path], check=True,
                              capture_output=True, text=True).stdout
     rows = (line.split() for line in listing.splitlines())
     return sum(int(row[1], 16) for row in rows if row[-1] in _STORAGE)

@@ -10,16 +10,16 @@ import re
 import subprocess
 from dataclasses import dataclass, field
 
-from blw.build import StepFailed
-from blw.cost.programs import Program, folder
+from blw.build import BUILD, StepFailed
+from blw.cost.programs import Program
 
 _NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"', re.MULTILINE)
 _EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', re.MULTILINE)
 _FRAME = re.compile(r"(\d+) bytes \((static|dynamic,bounded)\)")
 _FUNCTION = re.compile(r"^([0-9a-f]+) <(\w+)>:\n((?:.+\n)*)", re.MULTILINE)
 _PUSH = re.compile(r"\t(?:v?push|stmdb\tsp!,|str.*\[sp, #-).*")
-_RESERVE = re.compile(r"\tsub(?:\.w)?\tsp,(?: sp,)? #(\d+)")
-_CALL = re.compile(r"\tb(?:l|\.w|\.n)?\t[0-9a-f]+ <(\w+)>")
+_RESERVE = re.compile(r"\t(?:sub(?:\.w)?\tsp,(?: sp,)? #|addi\tsp,sp,-)(\d+)")
+_CALL = re.compile(r"\t(?:b|bl|b\.w|b\.n|j|jal|jalr)\t\S*?[0-9a-f]+(?:\(ra\))? <(\w+)>")
 
 
 @dataclass
@@ -48,7 +48,7 @@ def stack_bytes(program: Program, owner: str) -> int:
 
 def _of_compiler(program: Program) -> CallGraph:
     graph = CallGraph()
-    for path in folder(program.target).glob("lib/CMakeFiles/blw.dir/**/*.ci"):
+    for path in (BUILD / program.preset).glob("lib/CMakeFiles/blw.dir/**/*.ci"):
         text = path.read_text(encoding="utf-8")
         for name, label in _NODE.findall(text):
             frame = _FRAME.search(label)
@@ -75,7 +75,7 @@ def _add_library(graph: CallGraph, listing: str, symbols: str) -> None:
 
 
 def _said(program: Program, tool: str, *options: str) -> str:
-    return subprocess.run([program.target.tools + tool, *options, program.elf], check=True,
+    return subprocess.run([program.target.tools + tool, *options, program.path], check=True,
                           capture_output=True, text=True).stdout
 
 
@@ -91,7 +91,7 @@ def _pushed(body: str) -> int:
 
 
 def _register_bytes(line: str) -> int:
-    """Of "push {r4-r7, lr}", "stmdb sp!, {...}", "vpush {d8-d9}", "str.w r4, [sp, #-8]!"."""
+    """Of Arm's "push {r4-r7, lr}", "stmdb sp!, {...}", "vpush {d8-d9}", "str.w r4, [sp, #-8]!"."""
     listed = re.search(r"\{(.*)\}", line)
     if not listed:
         return int(re.search(r"#-(\d+)", line)[1])
