@@ -3,12 +3,12 @@
 
 static uint64_t now_us(blw_port_t *self)
 {
-    return ((const blw_ring_port_t *)self)->ring->now_us;
+    return ((const blw_ring_port_t *)(const void *)self)->ring->now_us;
 }
 
 static bool recv(blw_port_t *self, blw_frame_t *frame)
 {
-    blw_ring_port_t *const  port = (blw_ring_port_t *)self;
+    blw_ring_port_t *const  port = (blw_ring_port_t *)(void *)self;
     const blw_ring_t *const ring = port->ring;
 
     if ((ring->written - port->read) > ring->len) {
@@ -29,7 +29,7 @@ static bool recv(blw_port_t *self, blw_frame_t *frame)
 
 static bool send(blw_port_t *self, const blw_frame_t *frame)
 {
-    const blw_ring_port_t *const port = (const blw_ring_port_t *)self;
+    const blw_ring_port_t *const port = (const blw_ring_port_t *)(const void *)self;
     blw_ring_t *const            ring = port->ring;
     blw_ring_slot_t *const       slot = &ring->slots[ring->written % ring->len];
 

@@ -196,12 +196,12 @@ typedef struct flood_port {
 
 static uint64_t flood_now_us(blw_port_t *self)
 {
-    return ((flood_port_t *)self)->now_us;
+    return ((flood_port_t *)(void *)self)->now_us;
 }
 
 static bool flood_recv(blw_port_t *self, blw_frame_t *frame)
 {
-    flood_port_t *const port = (flood_port_t *)self;
+    flood_port_t *const port = (flood_port_t *)(void *)self;
 
     *frame      = port->frame;
     frame->t_us = port->now_us;
