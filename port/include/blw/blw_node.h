@@ -18,7 +18,8 @@
  *  Frames with a wrong CRC or layout, of past or future steps, and beyond the number that
  *  `babbling` allows are counted, told in the status, and otherwise ignored.
  *
- *  A sensor may say that it has no sample (flag of the measurement); the node does not wait for it.
+ *  A sensor may say that it has no sample (flag of the measurement): it is missing, but not counted
+ *  as lost.  The node waits for the deadline all the same, since somebody else may have said so.
  *
  *  In a split deployment the node collects the r local states (zeta) of every sensor instead of its
  *  sample, for an estimator that takes those for y; they have to come in their order.
