@@ -5,8 +5,7 @@
 
 namespace sim
 {
-namespace
-{
+const char *const ORACLE = "oracle";
 
 Verdict verdict_of(const blw_estimator_out_t &out, Instant at, const Design &design)
 {
@@ -27,10 +26,6 @@ Verdict verdict_of(const blw_estimator_out_t &out, Instant at, const Design &des
     verdict.flags      = out.flags;
     return verdict;
 }
-
-} // namespace
-
-const char *const ORACLE = "oracle";
 
 Bench::Bench(const Design &design, const std::vector<std::string> &methods, bool compare)
     : design_(&design), plant_(load_plant(design)), oracle_(design)

@@ -35,10 +35,13 @@ struct Trace {
     std::vector<std::string> extra_columns; /* of this method alone */
 };
 
+/** What an estimator reported, in double. */
+Verdict verdict_of(const blw_estimator_out_t &out, Instant at, const Design &design);
+
 class Bench
 {
 public:
-    /** The methods named, `kalman` among them, each once.  @param design outlives the bench
+    /** The methods named, each once.  @param design outlives the bench
      *  @param compare also the filters of comparison.h */
     Bench(const Design &design, const std::vector<std::string> &methods, bool compare);
 

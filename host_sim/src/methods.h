@@ -79,6 +79,11 @@ public:
     /** One step with u(k-1) [l], y(k) [m]; the result holds until the next call. */
     const blw_estimator_out_t &step(const Eigen::VectorXd &u, const Eigen::VectorXd &y,
                                     blw_mask_t valid);
+    /** The estimator itself, for a node. */
+    blw_estimator_t *handle()
+    {
+        return self();
+    }
 
 private:
     blw_estimator_t *self()

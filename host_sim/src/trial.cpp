@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "trial.h"
 #include "plant.h"
+#include "text.h"
 #include <cmath>
 
 namespace sim
@@ -9,17 +10,6 @@ namespace
 {
 
 const char *const TRUTH = "truth";
-
-std::optional<Divergence> diverged(const Eigen::VectorXd &x, const Scenario &scenario,
-                                   const Design &design, std::uint64_t k)
-{
-    for (Eigen::Index j = 0; j < x.size(); j++) {
-        if (!(std::fabs(x[j]) <= scenario.diverged_at)) {
-            return Divergence{0U, k, design.states[static_cast<std::size_t>(j)], x[j]};
-        }
-    }
-    return std::nullopt;
-}
 
 Eigen::VectorXd input(const Scenario &scenario, const Design &design, const TruePlant &plant,
                       const Bench &bench, double t_s)
@@ -39,6 +29,25 @@ void take(AttackedSamples attacked, Row &row)
 
 } // namespace
 
+std::optional<Divergence> find_divergence(const Eigen::VectorXd &x, const Scenario &scenario,
+                                          const Design &design, std::uint64_t k)
+{
+    for (Eigen::Index j = 0; j < x.size(); j++) {
+        if (!(std::fabs(x[j]) <= scenario.diverged_at)) {
+            return Divergence{0U, k, design.states[static_cast<std::size_t>(j)], x[j]};
+        }
+    }
+    return std::nullopt;
+}
+
+std::string divergence_text(const std::string &input, const Divergence &divergence)
+{
+    return input + ": the plant diverged in run " + std::to_string(divergence.run + 1U)
+           + " at k = " + std::to_string(divergence.k) + ": state " + divergence.state + " = "
+           + with_digits(divergence.value, 3)
+           + "; an unstable plant needs a stabilising [controller]";
+}
+
 Simulation simulate(const Scenario &scenario, const Design &design, std::uint64_t seed,
                     Bench &bench)
 {
@@ -54,7 +63,7 @@ Simulation simulate(const Scenario &scenario, const Design &design, std::uint64_
     rows.front().u = input(scenario, design, plant, bench, 0.0);
     for (std::uint64_t k = 1U; k <= scenario.steps; k++) {
         plant.step(rows.back().u);
-        result.divergence = diverged(plant.x(), scenario, design, k);
+        result.divergence = find_divergence(plant.x(), scenario, design, k);
         if (result.divergence) {
             break;
         }

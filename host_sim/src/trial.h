@@ -18,6 +18,12 @@ struct Divergence {
     double        value = 0.0;
 };
 
+/** The first state that is out of bounds, if there is one. */
+std::optional<Divergence> find_divergence(const Eigen::VectorXd &x, const Scenario &scenario,
+                                          const Design &design, std::uint64_t k);
+/** The same as one line. */
+std::string divergence_text(const std::string &input, const Divergence &divergence);
+
 struct Simulation {
     Log                       log;
     std::optional<Divergence> divergence; /* the log ends before it */

@@ -179,15 +179,49 @@ static bool publish_health(blw_port_lcm_t *self)
     return count(self, bulwark_health_t_publish(self->lcm, "BLW_HEALTH", &message));
 }
 
+/* A status that is passed on: frames say less than a report. */
+static bool publish_passed_on(blw_port_lcm_t *self, const blw_frame_t *frame)
+{
+    blw_wire_status_t status;
+    char              method[1]                  = "";
+    double            suspicion[BLW_MAX_SENSORS] = {0.0};
+    int8_t            excluded[BLW_MAX_SENSORS]  = {0};
+
+    if (blw_wire_get_status(frame, &status) != BLW_WIRE_OK) {
+        return true;
+    }
+    const bulwark_estimate_t message = {.utime      = utime(),
+                                        .seq        = step_of(self, status.seq),
+                                        .method     = method,
+                                        .n          = self->plant->n,
+                                        .x_hat      = self->estimate,
+                                        .m          = self->plant->m,
+                                        .suspicion  = suspicion,
+                                        .excluded   = excluded,
+                                        .outcome    = status.outcome,
+                                        .flags      = status.flags,
+                                        .iterations = status.iterations};
+    return count(self, bulwark_estimate_t_publish(self->lcm, "BLW_ESTIMATE", &message));
+}
+
+static void take_estimate(blw_port_lcm_t *self, const blw_frame_t *frame)
+{
+    blw_wire_values_t values;
+
+    if (blw_wire_get_values(frame, &values) != BLW_WIRE_OK) {
+        return;
+    }
+    for (size_t j = 0U; j < values.count; j++) {
+        self->estimate[values.first + j] = (double)values.value[j];
+    }
+}
+
 static bool publish_report(blw_port_lcm_t *self)
 {
     const blw_node_report_t *const report = self->report;
     char                           method[32];
     int8_t                         excluded[BLW_MAX_SENSORS];
 
-    if (report == NULL) {
-        return true;
-    }
     const bool alarm = (report->out.excluded != self->excluded)
                        || ((report->out.threshold > BLW_R(0.0))
                            && (report->out.statistic > report->out.threshold));
@@ -213,11 +247,13 @@ bool blw_lcm_publish(blw_port_lcm_t *self, const blw_frame_t *frame)
     case BLW_WIRE_ZETA:
         return publish_values(self, frame);
     case BLW_WIRE_STATUS:
-        return publish_report(self);
-    case BLW_WIRE_FOREIGN:
+        return (self->report != NULL) ? publish_report(self) : publish_passed_on(self, frame);
     case BLW_WIRE_ESTIMATE:
+        take_estimate(self, frame);
+        return true;
+    case BLW_WIRE_FOREIGN:
     case BLW_WIRE_SENSOR_BITS:
     default:
-        return true; /* the report says it all */
+        return true; /* a status says it all */
     }
 }

@@ -9,7 +9,8 @@
  *  Frames that are sent are collected until all values of their kind are there and published as one
  *  message; a classic measurement at once, as a message in which only that sensor is valid.  A
  *  status frame publishes the report behind it: BLW_ESTIMATE, BLW_ALARM when the excluded sensors
- *  change, and BLW_HEALTH when something happened on the bus.
+ *  change, and BLW_HEALTH when something happened on the bus; without a report (a gateway), the
+ *  estimate of the frames before it.
  *
  *  input_t.seq is the step from which u acts; the frame's seq is one more, see blw_wire.h.  LCM
  *  hears its own messages: the owner of the port does not listen to what it sends.
@@ -57,6 +58,7 @@ typedef struct blw_port_lcm {
     size_t                   next;     /* of the queue */
     size_t                   waiting;
     blw_frame_t              queue[BLW_LCM_QUEUE];
+    double                   estimate[BLW_WIRE_MAX_STATES + 1U]; /* passed on, until its status */
     blw_lcm_batch_t          batch;
     blw_lcm_counters_t       counters;
 } blw_port_lcm_t;
