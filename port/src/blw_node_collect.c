@@ -244,8 +244,7 @@ void blw_node_take_values(blw_node_t *self, const blw_frame_t *frame)
 
 bool blw_node_complete(const blw_node_t *self)
 {
-    return ((self->complete | self->absent) == BLW_MASK_ALL(self->plant->m))
-           && (self->inputs == self->plant->l);
+    return (self->complete == BLW_MASK_ALL(self->plant->m)) && (self->inputs == self->plant->l);
 }
 
 static void settle_inputs(blw_node_t *self)
