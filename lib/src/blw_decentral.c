@@ -250,6 +250,9 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
     if (covered && (g <= blw_decentral_threshold(model, self->set))) {
         return (self->set == 0U) ? BLW_OUTCOME_KALMAN : BLW_OUTCOME_CONVERGED;
     }
+    if (used == 0U) { /* nothing new is known, and what the filters do by themselves is no reason */
+        return BLW_OUTCOME_HELD;
+    }
     return search(self, needed, &out->iterations);
 }
 

@@ -168,6 +168,19 @@ static void test_step_given_every_set_fails_reports_the_best_and_says_so(void)
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 5.0, out.x_hat[0]);
 }
 
+static void test_step_given_no_sample_at_all_keeps_the_choice(void)
+{
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(1000.0), 7U);
+    filter.delta[0] = BLW_R(100.0); /* then 25: without sensor 2, g = 312 > 4 */
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 0U);
+    TEST_ASSERT_EQUAL_HEX64(4U, out.excluded);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
+    TEST_ASSERT_EQUAL_UINT(0U, out.iterations);
+    filter.delta[0] = BLW_R(100.0);
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 2U);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+}
+
 static void test_step_given_no_candidates_keeps_all_sensors_and_says_so(void)
 {
     made.plant.p           = 0U;
@@ -305,6 +318,7 @@ int main(void)
     RUN_TEST(test_step_given_reseed_and_a_last_sensor_restarts_its_filter);
     RUN_TEST(test_step_given_reseed_leaves_a_filter_that_passes_alone);
     RUN_TEST(test_step_given_every_set_fails_reports_the_best_and_says_so);
+    RUN_TEST(test_step_given_no_sample_at_all_keeps_the_choice);
     RUN_TEST(test_step_given_no_candidates_keeps_all_sensors_and_says_so);
     RUN_TEST(test_search_given_degrees_of_freedom_compares_g_plus_c);
     RUN_TEST(test_score_given_values_far_out_keeps_their_order);

@@ -139,7 +139,8 @@ blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model
 /** As blw_estimator_ops.reset: as if no sensor had ever been suspected. */
 blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_t *x0);
 /** As blw_estimator_ops.step.  statistic is g of all sensors, `excluded` the set left out,
- *  iterations the sets compared.  BLW_OUTCOME_HELD: the best set fails its test, too.
+ *  iterations the sets compared.  BLW_OUTCOME_HELD: the best set fails its test, too, or the chosen
+ *  one does in a step without any sample, which is no reason to choose again.
  *  n (n + l) + m n + sum mu_i^2 + d mu - d^2 / 2 + 2 n mu multiply-adds with steady gains and
  *  nothing suspicious; about n_candidates (d mu - d^2 / 2 + d rows) more in a search. */
 blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, const blw_real_t *y,
