@@ -177,8 +177,9 @@ static void test_step_given_no_sample_at_all_keeps_the_choice(void)
     TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
     TEST_ASSERT_EQUAL_UINT(0U, out.iterations);
     filter.delta[0] = BLW_R(100.0);
-    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 2U);
-    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    step_nu(BLW_R(0.0), BLW_R(0.0), BLW_R(0.0), 2U); /* delta near 25, 0, 31: 0 and 2 agree */
+    TEST_ASSERT_EQUAL_HEX64(2U, out.excluded);
+    TEST_ASSERT_EQUAL_UINT(3U, out.iterations);
 }
 
 static void test_step_given_no_candidates_keeps_all_sensors_and_says_so(void)
