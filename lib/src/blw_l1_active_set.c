@@ -166,6 +166,16 @@ static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
     return dropped;
 }
 
+/* Whether L can hold another group: A never has more rows than one beyond the rank of Z in exact
+ * arithmetic, where the step along the null direction takes one out again.  A pivot that is nothing
+ * but rounding may pass for a true one; then g has to wait until a group has left. */
+static bool has_room(const blw_l1_t *self, size_t g)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    return (self->rows + blw_l1_size(m, g)) <= BLW_L1_ROWS(m->N, m->d, m->n_groups);
+}
+
 /* Put g into A with a first nu_g: 0+ for one row, a safe step along l_g for a pair. */
 static void enter(blw_l1_t *self, size_t g)
 {
@@ -253,7 +263,7 @@ void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *in
             before          = BLW_REAL_MAX;
             continue;
         }
-        if ((worst != none) && low(residual, before, enough)) {
+        if ((worst != none) && low(residual, before, enough) && has_room(self, worst)) {
             enter(self, worst);
         }
         const pass_t pass = descend(self, zeta);

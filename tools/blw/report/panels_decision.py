@@ -15,7 +15,7 @@ from blw.report import style
 from blw.report.data import Recording, Track
 from blw.report.figures import phases
 from blw.report.panels import Drawn, any_defended, attack_words, defended, panel
-from blw.report.series import bin_edges
+from blw.report.series import Array, bin_edges
 from blw.report.style import Layout
 
 OUTCOMES = {
@@ -28,6 +28,9 @@ OUTCOMES = {
 }
 OUTCOME = re.compile("|".join(name for name in OUTCOMES if name not in ("no output", "other")))
 STRIP_ROWS = 40
+MANY_THRESHOLDS = 50.0
+LOWEST = 1e-2
+"""Of a threshold: where a logarithmic axis begins."""
 
 
 @panel("statistic", "Statistic against threshold", any_defended)
@@ -40,12 +43,13 @@ def statistic(recording: Recording, layout: Layout) -> Drawn:
     for ax, track in zip(axes, tracks):
         style.shade(ax, recording)
         level = np.where(track.tested, track.threshold, np.nan)
-        log = style.spans_decades(track.statistic / level)
+        log = _needs_log(track.statistic / level)
         values = style.positive(track.statistic) if log else track.statistic
         style.line(ax, recording, values, layout, color=style.colour(track.name), lw=0.8)
         style.line(ax, recording, level, layout, **threshold)
         if log:
             ax.set_yscale("log")
+            ax.set_ylim(bottom=max(ax.get_ylim()[0], LOWEST * np.nanmin(level)))
             style.plain_log(ax.yaxis)
         style.title(ax, track.name, _alarm_note(recording, track))
     return Drawn(
@@ -55,6 +59,11 @@ def statistic(recording: Recording, layout: Layout) -> Drawn:
         "in attack.",
         f"One panel each for {', '.join(t.name for t in tracks)}. " + attack_words(recording),
     )
+
+
+def _needs_log(ratio: Array) -> bool:
+    """Of statistic over threshold [T]: most of it would lie flat on a linear axis."""
+    return style.spans_decades(ratio) or bool(np.any(ratio > MANY_THRESHOLDS))
 
 
 def _alarm_note(recording: Recording, track: Track) -> str:
