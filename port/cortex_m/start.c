@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Start-up of a Cortex-M: vector table, memory, FPU, then main() by way of semihosting_main(). */
+/* Start-up of a Cortex-M: vector table, memory, FPU, then main() by way of start_main(). */
+#include "start.h"
 #include "semihosting.h"
 #include <string.h>
 
@@ -40,7 +41,7 @@ intptr_t semihosting_call(intptr_t operation, const void *parameters)
 
 void start_fault(void)
 {
-    semihosting_exit(FAULT_STATUS);
+    start_end(FAULT_STATUS);
 }
 
 void start_reset(void)
@@ -52,5 +53,5 @@ void start_reset(void)
     (void)memcpy(blw_data_start, blw_data_image,
                  (size_t)((char *)blw_data_end - (char *)blw_data_start));
     (void)memset(blw_bss_start, 0, (size_t)((char *)blw_bss_end - (char *)blw_bss_start));
-    semihosting_main();
+    start_main();
 }

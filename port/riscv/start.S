@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Start-up of a RISC-V machine: registers, FPU, memory, then main() by way of semihosting_main(). */
+/* Start-up of a RISC-V machine: registers, FPU, memory, then main() by way of start_main(). */
 #define FAULT_STATUS 99
 #define MSTATUS_FS_INITIAL 0x2000
 
@@ -25,12 +25,12 @@ start_reset:
     sub a2, a2, a0
     li a1, 0
     call memset
-    call semihosting_main
+    call start_main
 
     .balign 4
 start_fault:
     li a0, FAULT_STATUS
-    call semihosting_exit
+    call start_end
 
 /* These three instructions in this order, uncompressed and in one page, are a semihosting call. */
     .section .text.semihosting_call, "ax"

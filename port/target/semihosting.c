@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "semihosting.h"
 #include "host_io.h"
+#include "start.h"
 
 enum {
     SYS_OPEN          = 0x01,
@@ -74,7 +75,7 @@ void host_io_putc(int character)
     }
 }
 
-void semihosting_exit(int status)
+void start_end(int status)
 {
     const intptr_t parameters[2] = {APPLICATION_EXIT, status};
 
@@ -103,12 +104,12 @@ static int split(char *command, char **argv)
     return argc;
 }
 
-void semihosting_main(void)
+void start_main(void)
 {
     static char    command[MAX_COMMAND_LENGTH];
     static char   *argv[MAX_ARGUMENTS];
     const intptr_t parameters[2] = {(intptr_t)command, (intptr_t)sizeof command};
     const intptr_t failed        = semihosting_call(SYS_GET_CMDLINE, parameters);
 
-    semihosting_exit(main((failed == 0) ? split(command, argv) : 0, argv));
+    start_end(main((failed == 0) ? split(command, argv) : 0, argv));
 }
