@@ -15,6 +15,7 @@
  * end, and the share of |nu_g| below which a pair that stopped the step is taken to vanish. */
 #define BISECTIONS 40U
 #define SLOPE_LEFT BLW_R(0.25)
+#define NOISE      (BLW_R(16.0) * BLW_REAL_EPS) /* of the objective, relative: no rise */
 #define VANISHED   BLW_R(1e-3)
 
 /* What a pass did. */
@@ -103,10 +104,17 @@ static size_t vanished_pair(const blw_l1_t *self, const blw_real_t *zeta, blw_re
     return found;
 }
 
-/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic, a pair
- * that is carried past 0 turns the slope round at once, and a step along a null direction of H may
- * be of any length and sign.  A slope that is not a number is an overshoot; a point that is not
- * known to be short of the minimum is never taken, so the objective cannot rise. */
+/* Whether a slope `at` after alpha steps is too steep upwards.  The objective is convex: over the step
+ * it rises by at most alpha times this slope.  What is not a number is too steep. */
+static bool too_steep(const blw_l1_t *self, blw_real_t alpha, blw_real_t at, blw_real_t most)
+{
+    return !(at <= most)
+           && !((alpha * at) <= (NOISE * blw_la_dot(self->model->d, self->z, self->z)));
+}
+
+/* Shorten a step that overshoots the minimum along it: pairs make the objective non-quadratic, a
+ * pair that is carried past 0 turns the slope round at once, and a step along a null direction of H
+ * may be of any length and sign.  The objective never rises. */
 static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
 {
     const blw_real_t most = -SLOPE_LEFT * slope(self, zeta, BLW_R(0.0));
@@ -114,7 +122,7 @@ static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
     blw_real_t       high = pass->alpha;
     blw_real_t       at   = slope(self, zeta, high);
 
-    if ((at <= most) || (high <= BLW_R(0.0))) {
+    if ((high <= BLW_R(0.0)) || !too_steep(self, high, at, most)) {
         return;
     }
     for (size_t h = 0U; (h < BISECTIONS) && !(blw_la_abs(at) <= most); h++) {
@@ -126,7 +134,7 @@ static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
             high = pass->alpha;
         }
     }
-    if (!(blw_la_abs(at) <= most)) {
+    if (too_steep(self, pass->alpha, at, most)) {
         pass->alpha = low;
     }
     pass->blocked = vanished_pair(self, zeta, pass->alpha);
