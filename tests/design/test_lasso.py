@@ -77,8 +77,8 @@ def test_design_given_golden_system_packs_a_Z_that_cancels_x(name):
     assert np.abs(trapezoid(tables["l1"]).T @ G).max() < 1e-12 * np.abs(G).max()
 
 
-def test_design_given_no_options_recovers_nine_times_in_ten():
-    *_, designed = design("paper0")
+def test_design_given_nine_tenths_recovered_chooses_the_gamma_of_the_specification():
+    *_, designed = design("paper0", recovery_probability=0.9)
     assert designed.info["gamma"] == pytest.approx(53.0, abs=0.3)
     assert designed.info["recovery_probability"] == pytest.approx(0.9, abs=1e-4)
     c = np.array(designed.tables.to_json()["l1"]["c"])
@@ -88,6 +88,30 @@ def test_design_given_no_options_recovers_nine_times_in_ten():
 def test_design_given_recovery_probability_meets_it():
     *_, designed = design("complex", recovery_probability=0.5)
     assert designed.info["recovery_probability"] == pytest.approx(0.5, abs=1e-4)
+
+
+def test_design_given_no_options_loses_a_tenth_without_attack():
+    *_, designed = design("paper0")
+    assert 0.5 < designed.info["gamma"] < 0.6
+    assert designed.info["benign_loss"] == pytest.approx(0.1, abs=0.005)
+
+
+@pytest.mark.parametrize("gamma, loss", [(0.3, 0.18), (0.75, 0.06), (1.0, 0.04), (2.0, 0.01)])
+def test_design_given_gamma_states_the_loss_of_the_specification(gamma, loss):
+    *_, designed = design("paper0", gamma=gamma)
+    assert designed.info["benign_loss"] == pytest.approx(loss, abs=0.015)
+
+
+def test_design_given_smaller_loss_takes_a_larger_gamma():
+    *_, strict = design("complex", benign_loss=0.01)
+    *_, loose = design("complex", benign_loss=0.1)
+    assert strict.info["benign_loss"] <= 0.01
+    assert strict.info["gamma"] > 1.5 * loose.info["gamma"]
+
+
+def test_design_given_W_too_ill_conditioned_for_a_small_gamma_says_so():
+    *_, designed = design("paper1", gamma=1e-6)
+    assert designed.info["benign_loss"] is None
 
 
 @pytest.mark.parametrize("name, bound", [("paper0", 4 * 15), ("complex", 8 * 15)])
@@ -137,8 +161,10 @@ def test_design_given_a_model_states_the_sizes_of_its_memory():
 
 
 def test_design_given_gamma_and_probability_refuses():
-    with pytest.raises(ModelError, match="paper0: method.lasso: give gamma or"):
+    with pytest.raises(ModelError, match="paper0: method.lasso: give gamma or recovery_prob"):
         design("paper0", gamma=1.0, recovery_probability=0.9)
+    with pytest.raises(ModelError, match="recovery_probability or benign_loss, not both"):
+        design("paper0", benign_loss=0.1, recovery_probability=0.9)
 
 
 @pytest.mark.parametrize("raw, message", [
@@ -146,6 +172,7 @@ def test_design_given_gamma_and_probability_refuses():
     ({"gamma": 0.0}, "gamma must be greater than 0"),
     ({"gamma": "big"}, "gamma must be a finite number"),
     ({"recovery_probability": 1.0}, "recovery_probability must be at most 0.999"),
+    ({"benign_loss": 0.0}, "benign_loss must be greater than 0"),
     ({"max_iterations": 0}, "max_iterations must be at least 1"),
     ({"max_iterations": 70000}, "max_iterations must be at most 65535"),
     ({"tolerance": 0.0}, "tolerance must be at least"),
@@ -163,5 +190,5 @@ def test_design_given_shipped_plant_serves_it(name):
     designed = lasso.design(loaded, gains, lasso.Options())
     designed.tables.check()
     assert designed.info["cond_W"] < 1e9
-    assert designed.info["recovery_probability"] == pytest.approx(0.9, abs=1e-4)
+    assert designed.info["benign_loss"] == pytest.approx(0.1, abs=0.01)
     assert designed.info["unchecked_sensors"] == []

@@ -26,6 +26,7 @@ CAR = {
               "C": [[1.0, 0.0], [1.01, 0.01], [0.99, 0.0], [1.0, -0.02], [0.0, 1.0]],
               "R": [4e-3, 3e-3, 5e-3, 4e-3, 2e-2]},
     "attack": {"p": 1},
+    "method": {name: {"recovery_probability": 0.9} for name in ("lasso", "canonical")},
 }
 
 

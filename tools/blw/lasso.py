@@ -16,6 +16,7 @@ from blw import admm_tuning, l1, margin, straight
 from blw.design import Designed
 from blw.errors import ModelError
 from blw.kalman import Kalman
+from blw.l1_tuning import BenignLoss
 from blw.local_filters import LocalFilters, local_filters
 from blw.model import Model
 from blw.tables import Struct, table
@@ -25,7 +26,11 @@ Array = NDArray[np.float64]
 NAME = "lasso"
 AVERAGES = False
 
-DEFAULT_RECOVERY = 0.9
+#: Options that choose gamma; at most one is given.
+GAMMA_KEYS = ("gamma", "recovery_probability", "benign_loss")
+
+#: Mean square error without attack above that of the Kalman filter, as a part of it.
+DEFAULT_BENIGN_LOSS = 0.1
 
 #: Passes per row that the device keeps back from ADMM for the exact solve on the support.
 SUPPORT_RESERVE = 2
@@ -37,6 +42,7 @@ class Options:
 
     gamma: float | None = field(default=None, metadata={"gt": 0.0})
     recovery_probability: float | None = field(default=None, metadata={"gt": 0.0, "le": 0.999})
+    benign_loss: float | None = field(default=None, metadata={"gt": 0.0, "le": 10.0})
     max_iterations: int | None = field(default=None, metadata={"ge": 1, "le": 65535})
     #: wanted error of x_hat in benign standard deviations; only admm needs it
     tolerance: float = field(default=1e-6, metadata={"ge": 1e-12, "le": 1.0})
@@ -72,7 +78,7 @@ def assemble(
 ) -> Designed:
     """Tables blw_lasso_model_t and figures of one fusion; chooses gamma and the engine."""
     reduced_form, groups = fusion.reduced, fusion.groups
-    gamma, figures = choose_gamma(fusion, model, options)
+    gamma, figures = choose_gamma(fusion, model, float(np.trace(kalman.P)), options)
     problem = admm_tuning.Problem(reduced_form, groups, fusion.F, gamma, fusion.response)
     engine, engine_figures = choose_engine(problem, kalman, options)
     P = None if fusion.P is None else table(fusion.P, "[m][r x r] to canonical coordinates")
@@ -101,9 +107,10 @@ def steady_response(filters: LocalFilters) -> Array:
 
 def check_options(options: Any, model: Model, name: str) -> None:
     """Refuse options that contradict each other."""
-    if options.gamma is not None and options.recovery_probability is not None:
+    given = [key for key in GAMMA_KEYS if getattr(options, key) is not None]
+    if len(given) > 1:
         where = model.path or model.name
-        raise ModelError(f"{where}: method.{name}: give gamma or recovery_probability, not both")
+        raise ModelError(f"{where}: method.{name}: give {' or '.join(given)}, not both")
 
 
 def spans(filters: LocalFilters, sensors: int) -> list[slice]:
@@ -134,17 +141,21 @@ def disturbed(fusion: Fusion, model: Model) -> float:
 
 
 def choose_gamma(
-    fusion: Fusion, model: Model, options: Any
+    fusion: Fusion, model: Model, trace_P: float, options: Any
 ) -> tuple[float, dict[str, Any]]:
-    """gamma as given, or from the wanted probability of returning exactly the Kalman estimate."""
+    """gamma as given, from the wanted probability of returning exactly the Kalman estimate, also
+    under the disturbances within noise_margin, or from the wanted loss without attack."""
     reduced_form, groups = fusion.reduced, fusion.groups
     samples = l1.recovery_statistic(reduced_form, groups)
+    loss = BenignLoss(reduced_form, groups, fusion.F, trace_P)
     gamma = options.gamma
-    if gamma is None:
-        wanted = options.recovery_probability or DEFAULT_RECOVERY
-        gamma = float(np.quantile(samples, wanted) + disturbed(fusion, model))
+    if options.recovery_probability is not None:
+        gamma = float(np.quantile(samples, options.recovery_probability) + disturbed(fusion, model))
+    elif gamma is None:
+        gamma = loss.gamma_for(options.benign_loss or DEFAULT_BENIGN_LOSS, samples[-1])
     figures = {
         "gamma": gamma,
+        "benign_loss": loss(gamma),
         "recovery_probability": l1.probability(samples, gamma),
         "recovery_union_bound": l1.union_bound(reduced_form, groups, gamma),
         "gamma_for_recovery": {

@@ -13,8 +13,8 @@ def tuning(info: dict[str, Any]) -> dict[str, Any]:
     """From the figures of a design: gamma against the probability of returning exactly the Kalman
     estimate, chi-square thresholds against the false-alarm rate, and condition numbers."""
     found: dict[str, Any] = {}
-    for key in ("gamma", "recovery_probability", "recovery_union_bound", "gamma_for_recovery",
-                "cond_W", "cond_P", "cond_X", "k", "false_alarm", "false_rejection", "trace_P"):
+    for key in ("gamma", "benign_loss", "recovery_probability", "recovery_union_bound",
+                "gamma_for_recovery", "cond_W", "cond_P", "cond_X", "k", "false_alarm", "false_rejection", "trace_P"):
         if key in info:
             found[key] = info[key]
     full = next((s for s in info.get("sets", []) if s.get("excluded") == [] and "dof" in s), None)
@@ -31,6 +31,8 @@ def tuning_text(found: dict[str, Any]) -> str:
     if "gamma" in found:
         parts.append(f"gamma {found['gamma']:.4g}: exactly the Kalman estimate in"
                      f" {100 * found['recovery_probability']:.3g} % of benign steps")
+        if found["benign_loss"] is not None:
+            parts.append(f"{100 * found['benign_loss']:.2g} % more mean square error then")
     if "gamma_for_recovery" in found:
         parts.append("gamma for " + ", ".join(
             f"{100 * float(p):g} %: {g:.4g}" for p, g in found["gamma_for_recovery"].items()))
