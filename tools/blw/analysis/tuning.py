@@ -14,7 +14,8 @@ def tuning(info: dict[str, Any]) -> dict[str, Any]:
     estimate, chi-square thresholds against the false-alarm rate, and condition numbers."""
     found: dict[str, Any] = {}
     for key in ("gamma", "benign_loss", "recovery_probability", "recovery_union_bound",
-                "gamma_for_recovery", "cond_W", "cond_P", "cond_X", "k", "false_alarm", "false_rejection", "trace_P"):
+                "gamma_for_recovery", "cond_W", "cond_P", "cond_X", "k", "false_alarm",
+                "false_rejection", "trace_P"):
         if key in info:
             found[key] = info[key]
     full = next((s for s in info.get("sets", []) if s.get("excluded") == [] and "dof" in s), None)
