@@ -299,7 +299,11 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
         fuse(self, self->e);
         return;
     }
-    out->bound   = blw_guard_solve(self, &converged);
+    out->bound = blw_guard_solve(self, &converged);
+    if (!(out->bound <= BLW_REAL_MAX)) { /* only at the limit of the numbers */
+        out->bound = BLW_REAL_MAX;
+        converged  = false;
+    }
     out->outcome = (uint8_t)(converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND);
     fuse(self, self->eta);
 }

@@ -14,8 +14,8 @@
 /* |1 - mu |nu| / k| that ends the search for mu. */
 #define CLOSE (BLW_R(64.0) * BLW_REAL_EPS)
 
-/* Steps of Newton's method. */
-#define MOST_STEPS 12U
+/* Steps of Newton's method at most; what they leave is left to the next update of the sensor. */
+#define MOST_STEPS 5U
 
 /* nu [r] of (10) from g [r] and s [r]; gamma = |g| > k. */
 static void solve_secular(size_t r, blw_real_t k, blw_real_t gamma, const blw_real_t *s,
@@ -55,15 +55,17 @@ void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j)
     blw_real_t *const g      = &self->turned[r];
     blw_real_t *const after  = &self->turned[2U * r];
 
-    for (size_t a = 0U; a < r; a++) {
-        self->step[a] = self->e[(i * r) + a] - self->eta[(i * r) + a];
-    }
     blw_la_fill(3U * r, BLW_R(0.0), self->turned);
-    guard_mul(r, r, 0U, r, V, self->step, before);
-    for (size_t c = 0U; c < r; c++) {
-        g[c] = s[c] * before[c];
-    }
     guard_mul(r, r, 0U, r, V, &self->l[i * r], g);
+    if (guard_has(self->attacked, i)) {
+        for (size_t a = 0U; a < r; a++) {
+            self->step[a] = self->e[(i * r) + a] - self->eta[(i * r) + a];
+        }
+        guard_mul(r, r, 0U, r, V, self->step, before);
+        for (size_t c = 0U; c < r; c++) {
+            g[c] += s[c] * before[c];
+        }
+    }
     const blw_real_t gamma = blw_la_norm(r, g);
     self->attacked &= ~guard_bit(i);
     if (gamma > model->k) {

@@ -42,6 +42,7 @@ typedef struct descent {
     bool       gross;   /* l may hold the rounding of a gross attack */
     bool       decides; /* ends as soon as it is clear which units to exclude */
     bool       fresh;   /* the survey is up to date */
+    blw_mask_t chosen;  /* what `decides` has ended with, or 0 */
 } descent_t;
 
 /* s of (7) from |h_i|. */
@@ -278,9 +279,13 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
             continue;
         }
         if (!still && descent->decides && (self->updates > 0U)) {
-            (void)choose_excluded(self, CLEAR * descent->largest, &clear);
+            descent->chosen = choose_excluded(self, CLEAR * descent->largest, &clear);
         }
-        if (still || clear || !update(self, descent)) {
+        if (clear) {
+            return false;
+        }
+        descent->chosen = 0U;
+        if (still || !update(self, descent)) {
             return still;
         }
         descent->gross = descent->gross || (descent->largest > (GROSS * k));
@@ -340,7 +345,7 @@ static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, d
     }
     descent->decides     = false;
     const bool converged = descend(self, limit - kept, descent);
-    if (!converged && (kept > 0U)) {
+    if (!converged && (kept > 0U) && ((self->updates + kept) <= limit)) {
         eliminate(self);
     }
     return converged;
@@ -352,57 +357,72 @@ static void exclude_at_once(blw_guard_t *self, descent_t *descent)
 {
     const blw_guard_model_t *const model  = self->model;
     const blw_real_t               margin = AT_ONCE * model->k;
-    size_t                         i      = 0U;
 
-    survey(self, descent);
-    descent->fresh = true;
-    if ((model->pairs == 0U) || !descent->decides
-        || !(descent->largest > (model->exclude + margin))) {
+    if ((model->pairs == 0U) || !descent->decides) {
         return;
     }
-    const size_t chosen = descent->sensor;
-    descent->gross      = descent->largest > (GROSS * model->k);
+    size_t           chosen  = 0U;
+    const blw_real_t largest = largest_outside(self, 0U, &chosen);
+    if (!(largest > (model->exclude + model->k + margin))) {
+        return;
+    }
+    descent->gross = largest > (GROSS * model->k);
     exclude(self, guard_bit(chosen), descent);
     survey(self, descent);
+    size_t           i      = 0U;
     const blw_real_t others = blw_la_max(model->exclude, largest_outside(self, self->excluded, &i));
-    if (!((self->h[chosen] - others) > margin)) {
+    descent->fresh          = (self->h[chosen] - others) > margin;
+    if (!descent->fresh) {
         self->excluded = 0U;
-        descent->fresh = false;
     }
 }
 
-/* (9); BLW_REAL_MAX if there is none. */
-static blw_real_t bound_of(const blw_guard_t *self)
+/* sum_i k |nu_i| over the sensors with a penalty; *l_nu: sum_i l_i' nu_i. */
+static blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
+{
+    const size_t r     = self->model->r;
+    blw_real_t   total = BLW_R(0.0);
+    size_t       row   = 0U;
+
+    *l_nu = BLW_R(0.0);
+    for (blw_mask_t rest = self->attacked & ~self->excluded; rest != 0U; rest >>= 1) {
+        blw_real_t square = BLW_R(0.0);
+
+        for (size_t a = row; ((rest & 1U) != 0U) && (a < (row + r)); a++) {
+            const blw_real_t nu = self->e[a] - self->eta[a];
+
+            square += nu * nu;
+            *l_nu += self->l[a] * nu;
+        }
+        total += blw_la_sqrt(square);
+        row += r;
+    }
+    return self->model->k * total;
+}
+
+/* (9), where l' S^+ l = l' tau; BLW_REAL_MAX if the model has no kappa. */
+static blw_real_t bound_of(blw_guard_t *self)
 {
     const blw_guard_model_t *const model   = self->model;
-    const size_t                   r       = model->r;
     const size_t                   m       = model->head.plant->m;
-    blw_real_t                     t       = BLW_R(1.0);
-    blw_real_t                     penalty = BLW_R(0.0);
+    blw_real_t                     largest = model->k * model->k; /* of k^2 and the |l_i|^2 */
     blw_real_t                     l_nu    = BLW_R(0.0);
-    blw_real_t                     energy  = blw_la_dot(m * r, self->l, self->eta);
 
+    blw_guard_squares(model, self->l, self->suspicion); /* which judge_sensors() sets later */
     for (size_t i = 0U; i < m; i++) {
-        if (guard_has(self->excluded, i)) {
-            continue;
-        }
-        blw_real_t nu = BLW_R(0.0);
-        for (size_t a = i * r; a < ((i + 1U) * r); a++) {
-            const blw_real_t nu_a = self->e[a] - self->eta[a];
-            nu += nu_a * nu_a;
-            l_nu += self->l[a] * nu_a;
-        }
-        penalty += model->k * blw_la_sqrt(nu);
-        const blw_real_t l = blw_la_norm(r, &self->l[i * r]);
-        t                  = ((t * l) > model->k) ? (model->k / l) : t;
+        largest = blw_la_max(largest, self->suspicion[i]);
     }
-    energy                = BLW_R(0.5) * blw_la_max(BLW_R(0.0), energy);
-    const blw_real_t rest = ((BLW_R(1.0) - t) * (BLW_R(1.0) - t) * energy) + (penalty - (t * l_nu));
-    const blw_real_t root = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), rest));
-    const blw_real_t size = (BLW_R(2.0) * (energy + penalty)) / model->k;
+    const blw_real_t t       = blw_la_sqrt((model->k * model->k) / largest);
+    const blw_real_t penalty = penalty_of(self, &l_nu);
+    const blw_real_t product = blw_la_dot(m * model->r, self->l, self->eta);
+    const blw_real_t energy  = BLW_R(0.5) * blw_la_max(BLW_R(0.0), product);
+    const blw_real_t rest    = BLW_R(1.0) - t;
+    const blw_real_t gap     = (rest * rest * energy) + (penalty - (t * l_nu));
+    const blw_real_t root    = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), gap));
+    const blw_real_t size    = (BLW_R(2.0) * (energy + penalty)) / model->k;
     const blw_real_t most = (model->kappa * (size + (model->omega * root))) + (model->sigma * root);
     const bool       none = (model->n_u > 0U) && !(model->kappa > BLW_R(0.0));
-    return (!none && (most <= BLW_REAL_MAX)) ? most : BLW_REAL_MAX;
+    return none ? BLW_REAL_MAX : most;
 }
 
 /* The first descent, and what it excludes.  @return that set. */
@@ -410,8 +430,8 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
                                 bool *converged)
 {
     const unsigned most  = self->model->max_updates;
-    blw_mask_t     set   = 0U;
     bool           clear = false;
+    blw_mask_t     set   = 0U;
 
     exclude_at_once(self, descent);
     if (self->excluded != 0U) {
@@ -419,7 +439,7 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
     }
     *converged = descend(self, descent->decides ? limit : most, descent);
     if (descent->decides) {
-        set = choose_excluded(self, BLW_R(0.0), &clear);
+        set = (descent->chosen != 0U) ? descent->chosen : choose_excluded(self, BLW_R(0.0), &clear);
     }
     if ((set == 0U) && !*converged) {
         descent->decides = false;

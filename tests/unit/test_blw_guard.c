@@ -191,6 +191,126 @@ static void test_step_given_a_slow_bias_raises_suspicion_only(void)
     TEST_ASSERT_TRUE(out.suspicion[0] > BLW_R(0.35));
 }
 
+/* Straight-line code for the model as it is, S with -1/2 beside 1. */
+static unsigned kernel_calls;
+static bool     kernel_serves;
+
+static bool advance_kernel(const blw_real_t *input, const blw_real_t *y, const blw_real_t *x_ref,
+                           const blw_real_t *eta, blw_real_t *x_bar, blw_real_t *e)
+{
+    if (!kernel_serves) {
+        return false;
+    }
+    const blw_plant_t *const plant = &made.kalman.plant;
+    x_bar[0]                       = (plant->A[0] * x_ref[0]) + (plant->Bu[0] * input[0]);
+    for (size_t i = 0U; i < 3U; i++) {
+        e[i] = (guard_Lam[i] * eta[i])
+               + (guard_b[i] * ((y[i] - plant->offset[i]) - (plant->C[i] * x_bar[0])));
+    }
+    kernel_calls++;
+    return true;
+}
+
+static void multiply_kernel(const blw_real_t *tau, blw_real_t *l)
+{
+    for (size_t i = 0U; i < 3U; i++) {
+        l[i] = tau[i] + (guard_S[0] * (tau[(i + 1U) % 3U] + tau[(i + 2U) % 3U]));
+    }
+    kernel_calls++;
+}
+
+static void squares_kernel(const blw_real_t *l, blw_real_t *squares)
+{
+    for (size_t i = 0U; i < 3U; i++) {
+        squares[i] = l[i] * l[i];
+    }
+    kernel_calls++;
+}
+
+static void average_kernel(const blw_real_t *l, blw_real_t *average, blw_real_t *squares)
+{
+    for (size_t i = 0U; i < 3U; i++) {
+        average[i] += BLW_R(0.125) * (l[i] - average[i]);
+    }
+    squares_kernel(average, squares);
+}
+
+static void fuse_kernel(const blw_real_t *tau, const blw_real_t *e, const blw_real_t *x_bar,
+                        blw_real_t *x_ref, blw_real_t *eta)
+{
+    const blw_real_t d = (guard_Fu[0] * (tau[0] + tau[1])) + (guard_Fu[2] * tau[2]);
+
+    x_ref[0] = x_bar[0] + d;
+    for (size_t i = 0U; i < 3U; i++) {
+        eta[i] = e[i] - (guard_Gu[i] * d);
+    }
+    kernel_calls++;
+}
+
+static void move_kernel(size_t i, const blw_real_t *change, blw_real_t *l)
+{
+    for (size_t j = 0U; j < 3U; j++) {
+        l[j] += (j == i) ? BLW_R(0.0) : (guard_S[0] * change[0]);
+    }
+    kernel_calls++;
+}
+
+static void test_step_given_kernels_uses_them_for_the_same_result(void)
+{
+    const blw_real_t *const samples[3] = {benign, gross, mild};
+    blw_real_t              expected[9];
+
+    for (size_t k = 0U; k < 9U; k++) {
+        step(samples[k % 3U], 7U);
+        expected[k] = out.x_hat[0];
+    }
+    made.model.advance  = advance_kernel;
+    made.model.multiply = multiply_kernel;
+    made.model.squares  = squares_kernel;
+    made.model.average  = average_kernel;
+    made.model.fuse     = fuse_kernel;
+    made.model.move     = move_kernel;
+    for (size_t pass = 0U; pass < 2U; pass++) { /* the loops serve where the kernel refuses */
+        kernel_serves = pass == 0U;
+        kernel_calls  = 0U;
+        start();
+        for (size_t k = 0U; k < 9U; k++) {
+            step(samples[k % 3U], 7U);
+            TEST_ASSERT_REAL_WITHIN(16.0 * SUPPORT_TOL, expected[k], out.x_hat[0]);
+        }
+        TEST_ASSERT_TRUE(kernel_calls >= ((pass == 0U) ? 45U : 36U));
+    }
+    kernel_serves = true;
+    kernel_calls  = 0U;
+    step(benign, 6U); /* a missing sample */
+    TEST_ASSERT_EQUAL_HEX64(6U, out.used);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_guard_step(&guard, NULL, benign, 7U, &out)); /* u = 0 */
+    TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_guard_step(&guard, u, NULL, 7U, &out));
+}
+
+static void test_step_given_modes_that_decay_estimates_them_from_the_multipliers(void)
+{
+    static const blw_real_t Xs[1]  = {BLW_R(1.0)};
+    static const blw_real_t Sig[3] = {BLW_R(0.1), BLW_R(0.2), BLW_R(0.3)};
+
+    made.model.n_u = 0U;
+    made.model.Fu  = NULL;
+    made.model.Gu  = NULL;
+    made.model.Xs  = Xs;
+    made.model.Sig = Sig;
+    start();
+    step(benign, 7U); /* l = 0.75 s, 0, -0.75 s */
+    const double xs = -0.15 * GUARD_S;
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 3.0 + xs, out.x_hat[0]);
+    const double e_0 = (double)guard.eta[0];
+    const double A   = (double)made.kalman.plant.A[0];
+    const double C   = (double)made.kalman.plant.C[0];
+    step(benign, 6U); /* sensor 0 coasts on C A x_hat, xs above the reference's */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, (0.25 * e_0) + (GUARD_S * C * A * xs), guard.e[0]);
+    step(gross, 7U);
+    TEST_ASSERT_TRUE(out.bound <= BLW_REAL_MAX);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -206,5 +326,7 @@ int main(void)
     RUN_TEST(test_step_given_search_takes_the_set_that_explains_most);
     RUN_TEST(test_step_during_warm_up_excludes_nobody);
     RUN_TEST(test_step_given_a_slow_bias_raises_suspicion_only);
+    RUN_TEST(test_step_given_kernels_uses_them_for_the_same_result);
+    RUN_TEST(test_step_given_modes_that_decay_estimates_them_from_the_multipliers);
     return UNITY_END();
 }

@@ -47,6 +47,14 @@ static void test_init_given_sizes_out_of_limits_refuses(void)
 {
     made.model.r = 0U;
     assert_refused();
+    made.model.reach = 0U;
+    assert_refused();
+    made.model.reach = 2U;
+    assert_refused();
+    made.model.pairs = 2U;
+    assert_refused();
+    made.kalman.plant.p = 0U; /* nothing to be excluded */
+    assert_refused();
     made.model.n_u = 2U;
     assert_refused();
     made.model.n_units = 4U;
@@ -72,6 +80,9 @@ static void test_init_given_wrong_units_or_ranks_refuses(void)
     made.model.unit = NULL;
     assert_refused();
     made.model.rank = NULL;
+    assert_refused();
+    made.model.n_units = 2U; /* pairs are for sensors */
+    made.model.unit    = pair;
     assert_refused();
     made.model.unit = outside;
     assert_refused();
@@ -109,11 +120,11 @@ static void test_init_given_wrong_numbers_refuses(void)
 
 static void test_init_given_missing_tables_or_a_wrong_sum_refuses(void)
 {
-    const blw_real_t **const table[7] = {&made.model.Lam,  &made.model.b,  &made.model.S,
-                                         &made.model.Fu,   &made.model.Gu, &made.model.effect,
-                                         &made.model.drift};
+    const blw_real_t **const table[9] = {&made.model.Lam,   &made.model.b,  &made.model.S,
+                                         &made.model.Fu,    &made.model.Gu, &made.model.effect,
+                                         &made.model.drift, &made.model.V,  &made.model.s};
 
-    for (size_t i = 0U; i < 7U; i++) {
+    for (size_t i = 0U; i < 9U; i++) {
         *table[i] = NULL;
         assert_refused();
     }

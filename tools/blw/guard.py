@@ -43,9 +43,10 @@ LONGEST_WARM_UP = 10_000
 DRIFT_GAIN = 1.0 / 32.0
 DRIFT_SIGMAS = 5.0
 
-#: Block updates per step and attacked unit, and where less than RARE_CLIPPING of the benign steps
-#: need none.
-UPDATES = 6
+#: Block updates per step and attacked unit; where several sensors are excluded jointly; and where
+#: less than RARE_CLIPPING of the benign steps need none.
+UPDATES = 4
+UPDATES_IF_JOINT = 10
 UPDATES_IF_OFTEN = 100
 RARE_CLIPPING = 0.95
 
@@ -117,12 +118,13 @@ def choose_limits(
         raise ModelError(f"method.{NAME}: exclude is {exclude:g}; it must be at least k = {k:g}")
     ratios = guard_fusion.ratios(fusion, model.units, model.p)
     recovery = probability(samples, k)
+    pairs = guard_order.pair_reals(model, bank.r) > 0
     search = needs_search(model, ratios, newton_sensors(model) * bank.r)
     return Limits(
         k=k,
         exclude=exclude,
         search=search,
-        max_updates=options.max_updates or default_updates(model, search, recovery),
+        max_updates=options.max_updates or default_updates(model, pairs, search, recovery),
         warm_up=warm_up_steps(model, kalman, bank, fusion),
         figures={
             "k": k,
@@ -199,10 +201,12 @@ def needs_search(model: Model, ratios: Array, rows: int) -> bool:
     return bool(model.p > 0 and misled and affordable and (model.p > 1 or model.groups))
 
 
-def default_updates(model: Model, search: bool, recovery: float) -> int:
+def default_updates(model: Model, pairs: bool, search: bool, recovery: float) -> int:
     """Room for the steps of an attack on p units; several times that where benign noise alone often
     clips several sensors at once, and twice that where a second solution follows a search."""
-    each = UPDATES if recovery >= RARE_CLIPPING else UPDATES_IF_OFTEN
+    each = UPDATES if pairs else UPDATES_IF_JOINT
+    if recovery < RARE_CLIPPING:
+        each = UPDATES_IF_OFTEN
     return (2 if search else 1) * each * max(1, model.p)
 
 
