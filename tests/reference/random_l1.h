@@ -39,6 +39,23 @@ public:
         convert();
     }
 
+    // Every state seen alike by N / n groups of one row, with equal thresholds: for an even number
+    // of them there are many minimisers.
+    void make_degenerate(double threshold)
+    {
+        for (int i = 0; i < N_; ++i) {
+            G_.row(i) = Matrix::Identity(n_, n_).row(i % n_);
+        }
+        const Matrix own = W_.topLeftCorner(n_, n_);
+        W_.setZero();
+        for (int i = 0; i + n_ <= N_; i += n_) {
+            W_.block(i, i, n_, n_) = own;
+        }
+        reduce();
+        c_.setConstant(threshold);
+        convert();
+    }
+
     Matrix normal(Eigen::Index rows, Eigen::Index cols)
     {
         std::normal_distribution<double> distribution;
@@ -174,6 +191,9 @@ private:
     void convert()
     {
         const int d = N_ - n_;
+        for (auto *table : {&Z_table_, &F_table_, &c_table_, &M_table_}) {
+            table->clear();
+        }
         for (int i = 0; i < N_; ++i) {
             for (int j = 0; j < std::min(i + 1, d); ++j) {
                 Z_table_.push_back(static_cast<blw_real_t>(Z_(i, j)));

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The l1 fusion against optimality conditions and an ADMM of Eigen's, on random problems.
+#include <algorithm>
 #include <cstdio>
 #include <limits>
 
@@ -21,6 +22,7 @@ void expect(bool ok, const char *what, unsigned seed, double value)
     }
 }
 
+constexpr int    GUARD     = 64; // numbers behind the memory, which stay NaN
 constexpr bool   is_double = (sizeof(blw_real_t) == 8);
 constexpr double tolerance = is_double ? 1e-9 : 3e-3; // relative to thresholds of size 1
 
@@ -30,7 +32,7 @@ class Solver
 public:
     Solver(const Problem &problem, blw_l1_engine_t engine, int max_iterations)
         : model_(problem.model(engine, max_iterations)),
-          memory_(BLW_L1_MEM(model_.N, model_.d, model_.n_groups),
+          memory_(BLW_L1_MEM(model_.N, model_.d, model_.n_groups) + GUARD,
                   std::numeric_limits<blw_real_t>::quiet_NaN())
     {
         blw_l1_init(&state_, &model_, memory_.data());
@@ -41,6 +43,9 @@ public:
         const std::vector<blw_real_t> z(zeta.data(), zeta.data() + zeta.size());
         std::vector<blw_real_t>       x(model_.n);
         blw_l1_solve(&state_, z.data(), x.data(), &info);
+        expect(std::all_of(memory_.end() - GUARD, memory_.end(),
+                           [](blw_real_t value) { return std::isnan(value); }),
+               "nothing is written behind the memory", 0, double(model_.N));
         return Eigen::Map<Eigen::Matrix<blw_real_t, Eigen::Dynamic, 1>>(x.data(), model_.n)
             .cast<double>();
     }
@@ -130,6 +135,22 @@ void check_descent(unsigned seed, const std::vector<int> &sizes, int n)
     }
 }
 
+// Many minimisers, pivots that are nothing but rounding: finite, and within the memory.
+void check_degenerate(unsigned seed, int sensors, int n)
+{
+    for (const double threshold : {0.01, 0.1, 0.5}) {
+        Problem problem(seed, std::vector<int>(static_cast<std::size_t>(sensors * n), 1), n, 1.0);
+        problem.make_degenerate(threshold);
+        for (const blw_l1_engine_t engine : {BLW_L1_ACTIVE_SET, BLW_L1_ADMM}) {
+            Solver solver(problem, engine, 1000);
+            for (int k = 0; k < 10; ++k) {
+                const Vector x = solver.solve(rounded(problem.sample(k % 3)));
+                expect(x.allFinite(), "degenerate estimate is finite", seed, x.norm());
+            }
+        }
+    }
+}
+
 } // namespace
 
 int main()
@@ -144,6 +165,7 @@ int main()
         check_problem(seed, std::vector<int>(3 + seed % 4, 2), 2);
         check_descent(seed, std::vector<int>(12 + seed % 20, 1), 3);
         check_descent(seed, std::vector<int>(6 + seed % 10, 2), 4);
+        check_degenerate(seed, 4, 2 + int(seed % 3));
     }
     std::printf("%d failures\n", failures);
     return (failures == 0) ? 0 : 1;
