@@ -203,9 +203,10 @@ def needs_search(model: Model, ratios: Array, rows: int) -> bool:
 
 def default_updates(model: Model, pairs: bool, search: bool, recovery: float) -> int:
     """Room for the steps of an attack on p units; several times that where benign noise alone often
-    clips several sensors at once, and twice that where a second solution follows a search."""
+    clips several sensors at once, where whole groups have to be left out, or where the noise is not
+    white; and twice that where a second solution follows a search."""
     each = UPDATES if pairs else UPDATES_IF_JOINT
-    if recovery < RARE_CLIPPING:
+    if recovery < RARE_CLIPPING or model.groups or model.noise_margin > 0.0:
         each = UPDATES_IF_OFTEN
     return (2 if search else 1) * each * max(1, model.p)
 
