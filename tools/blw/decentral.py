@@ -77,11 +77,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     if count > _MAX_SETS:
         raise DesignError(f"p = {model.p} of {len(model.units)} sensors or groups makes {count} "
                           f"sets to compare, at most {_MAX_SETS} are supported")
-    if options.gains == "recursive" and options.reseed:
-        raise DesignError("reseed needs gains = \"steady\": a recursion would have to change P too")
-    if options.gains == "recursive" and np.any(model.rate < 1.0):
-        raise DesignError("plant.rate needs gains = \"steady\": a recursion would have to know the "
-                          "rate at every step")
+    _check_options(model, options)
     filters = local_filters(model)
     check_redundancy(model, filters)
     fusion = fuse(filters)
@@ -115,6 +111,15 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     info = _info(model, filters, tree, ranking, options)
     info |= {"warm_up": tables.members["warm_up"], "footprint": footprint}
     return Designed(tables, info, mem=mem)
+
+
+def _check_options(model: Model, options: Options) -> None:
+    """Refuse what a recursion cannot serve."""
+    if options.gains == "recursive" and options.reseed:
+        raise DesignError("reseed needs gains = \"steady\": a recursion would have to change P too")
+    if options.gains == "recursive" and np.any(model.rate < 1.0):
+        raise DesignError("plant.rate needs gains = \"steady\": a recursion would have to know the "
+                          "rate at every step")
 
 
 class _Ranking:

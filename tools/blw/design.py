@@ -73,9 +73,7 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         kalman = steady_state(model.A, model.C, model.W, model.R)
     except DesignError as error:
         raise DesignError(f"{where}: {error}") from None
-    averaged = model.averaged()
-    averaged_kalman = (kalman if np.all(model.rate == 1.0)
-                       else steady_state(model.A, model.C, model.W, averaged.R))
+    served = {False: (model, kalman), True: _averaged(model, kalman)}
     plant = plant_tables(model, kalman)
     plant.check()
     designed: dict[str, Designed] = {}
@@ -84,8 +82,7 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         progress(name)
         try:
             module = REGISTRY[name]
-            served = (averaged, averaged_kalman) if module.AVERAGES else (model, kalman)
-            result = module.design(*served, parsed[name])
+            result = module.design(*served[module.AVERAGES], parsed[name])
             result.tables.check()
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
@@ -96,6 +93,16 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         else:
             designed[name] = result
     return Design(model, plant, designed, refused)
+
+
+def _averaged(model: Model, kalman: "Kalman") -> tuple[Model, "Kalman"]:
+    """Model.averaged() and its filter; the same filter where every sensor sends in every step."""
+    from blw.kalman import steady_state
+
+    averaged = model.averaged()
+    if np.all(model.rate == 1.0):
+        return averaged, kalman
+    return averaged, steady_state(averaged.A, averaged.C, averaged.W, averaged.R)
 
 
 def plant_tables(model: Model, kalman: "Kalman") -> Struct:

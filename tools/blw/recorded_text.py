@@ -7,8 +7,20 @@ YARDSTICK = "oracle"
 
 
 def markdown(cases: list[dict[str, Any]]) -> str:
-    """A section per case."""
-    return "\n".join(_case(case) for case in cases)
+    """Medians and worst cases of all, then a section per case."""
+    return "\n".join([_overview(cases), *(_case(case) for case in cases)])
+
+
+def _overview(cases: list[dict[str, Any]]) -> str:
+    names = list(dict.fromkeys(name for case in cases for name in case["methods"]))
+    rows = [[case["name"], *(_median_and_worst(case["methods"].get(name)) for name in names)]
+            for case in cases]
+    return "\n".join(["Median (worst) RMSE over the attacks:", "",
+                      *_table(["log", *names], rows)]) + "\n"
+
+
+def _median_and_worst(figures: dict[str, Any] | None) -> str:
+    return "" if figures is None else f"{_number(figures['median'])} ({_number(figures['worst'])})"
 
 
 def _case(case: dict[str, Any]) -> str:
