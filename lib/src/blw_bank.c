@@ -100,6 +100,18 @@ static void advance_reference(blw_bank_t *self, const blw_real_t *u, const blw_r
     }
 }
 
+/* How long the gate still keeps a set out. */
+static void count_gate(blw_bank_t *self, size_t set)
+{
+    if (self->gross[set] > BLW_R(1.0)) {
+        self->wait[set] = self->model->horizon;
+    } else if (self->wait[set] > 0U) {
+        self->wait[set]--;
+    } else {
+        /* nothing gross in the last block */
+    }
+}
+
 /* (1) for one set, relative to x_bar of the reference.  A filter that a sample throws out of bounds
  * starts again from the reference.  first = sensors of all sets before this one.
  * @return the same for the next set */
@@ -132,13 +144,7 @@ static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, blw_mas
         }
         column++;
     }
-    if (self->gross[set] > BLW_R(1.0)) {
-        self->wait[set] = self->model->horizon;
-    } else if (self->wait[set] > 0U) {
-        self->wait[set]--;
-    } else {
-        /* nothing gross in the last block */
-    }
+    count_gate(self, set);
     if (!blw_la_bounded(n, d)) {
         blw_la_fill(n, BLW_R(0.0), d);
         blw_la_fill(n, BLW_R(0.0), d_bar);
