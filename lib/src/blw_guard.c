@@ -170,19 +170,14 @@ static blw_mask_t mend(blw_guard_t *self, blw_mask_t used)
     return taken;
 }
 
-/* (4) and (5) from tau and l. */
-static void fuse(blw_guard_t *self, const blw_real_t *tau)
+/* x_ref of (4) and eta of (5) from tau. */
+static void move_reference(blw_guard_t *self, const blw_real_t *tau)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   n     = model->head.plant->n;
     const size_t                   n_u   = model->n_u;
     const size_t                   N     = (size_t)model->head.plant->m * model->r;
 
-    if (model->fuse != NULL) {
-        model->fuse(tau, self->e, self->x_bar, self->x_ref, self->eta);
-        blw_la_copy(n, self->x_ref, self->x_hat);
-        return;
-    }
     blw_la_fill(n, BLW_R(0.0), self->d);
     guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
     blw_la_copy(n, self->x_bar, self->x_ref);
@@ -199,11 +194,26 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
     } else {
         blw_la_copy(N, self->e, self->eta);
     }
+}
+
+/* (4) and (5) from tau and l. */
+static void fuse(blw_guard_t *self, const blw_real_t *tau)
+{
+    const blw_guard_model_t *const model = self->model;
+    const size_t                   n     = model->head.plant->n;
+    const size_t                   n_s   = n - model->n_u;
+    const size_t                   N     = (size_t)model->head.plant->m * model->r;
+
+    if (model->fuse != NULL) {
+        model->fuse(tau, self->e, self->x_bar, self->x_ref, self->eta);
+    } else {
+        move_reference(self, tau);
+    }
     blw_la_copy(n, self->x_ref, self->x_hat);
-    if (n_u < n) {
-        blw_la_fill(n, BLW_R(0.0), self->d);
-        guard_mul(n - n_u, N, 0U, N, model->Sig, self->l, self->d);
-        blw_la_gemv_add(n, n - n_u, model->Xs, self->d, self->x_hat);
+    if (n_s > 0U) {
+        blw_la_fill(n_s, BLW_R(0.0), self->d);
+        guard_mul(n_s, N, 0U, N, model->Sig, self->l, self->d);
+        blw_la_gemv_add(n, n_s, model->Xs, self->d, self->x_hat);
     }
 }
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Method guard: identities of its design, and the C library against reference and claims."""
 
+import os
+
 import golden
 import guard_library
 import numpy as np
@@ -277,6 +279,32 @@ def test_library_given_any_attack_keeps_to_the_bound_on_updates(libraries, limit
     assert found["iterations"].max() <= designed.info["max_updates"]
     assert np.isfinite(found["x_hat"]).all() and np.isfinite(found["bound"]).all()
     assert np.all(found["bound"][found["outcome"] == BOUND] > 0.0)
+
+
+def random_attacks(plant, steps, generator):
+    """Noise, and on three sensors in ten attacks of 1 to 1e6 that come and go every five steps."""
+    y = generator.standard_normal((steps, plant.m)) @ np.linalg.cholesky(plant.R).T
+    held = np.repeat(generator.random((steps // 5, plant.m)) < 0.3, 5, axis=0)
+    size = 10.0 ** np.repeat(generator.uniform(0.0, 6.0, (steps // 20, plant.m)), 20, axis=0)
+    return y + held * size * generator.standard_normal((steps, plant.m))
+
+
+@pytest.mark.parametrize("name", ["liu5", "two attackers"])
+def test_library_given_random_attacks_never_exceeds_its_bound(libraries, name):
+    """50,000 steps each; 1,000,000 with BULWARK_EXTENDED=1."""
+    plant, gains = liu5()[:2] if name == "liu5" else colluding_plant()
+    designed = guard.design(plant, gains, guard.Options())
+    estimator = GuardLibrary(libraries["f32"], plant, gains, designed)
+    generator = np.random.default_rng(90)
+    chunk, chunks = 10_000, 100 if os.environ.get("BULWARK_EXTENDED") == "1" else 5
+    outcomes = set()
+    for _ in range(chunks):
+        found = estimator.run(random_attacks(plant, chunk, generator), np.zeros((chunk, plant.l)))
+        assert found["iterations"].max() <= designed.info["max_updates"]
+        assert np.isfinite(found["x_hat"]).all() and np.isfinite(found["bound"]).all()
+        assert np.all(found["bound"][found["outcome"] == BOUND] > 0.0)
+        outcomes |= set(found["outcome"])
+    assert {CONVERGED, BOUND} <= outcomes
 
 
 def test_library_given_few_updates_states_a_sound_error_bound(libraries):

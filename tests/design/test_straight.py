@@ -112,6 +112,12 @@ def test_kernel_given_any_data_has_the_bits_of_the_loops(tmp_path, name, width, 
     assert compare(tmp_path, made, method, width) == "0 1\n"
 
 
+def test_kernel_of_guard_given_modes_that_decay_has_the_bits_of_the_loops(tmp_path):
+    made = design.design_all(model.load(MODELS / "random6.toml"), ["kalman", "guard"])
+    assert made.methods["guard"].tables.to_json()["n_u"] < 6
+    assert compare(tmp_path, made, "guard", "f32") == "0 1\n"
+
+
 def steady(plant: model.Model) -> kalman.Kalman:
     return kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
 

@@ -168,7 +168,7 @@ def struct(
         "multiply": guard_straight.multiply(fusion),
         "squares": guard_straight.squares(model.m, bank.r),
         "average": guard_straight.average(model.m, bank.r, DRIFT_GAIN),
-        "fuse": guard_straight.fuse(fusion, model.n),
+        "fuse": guard_straight.fuse(fusion, bank.split.Xu),
         "move": guard_straight.move(fusion),
     }, method=NAME)
 

@@ -17,8 +17,9 @@ Array = NDArray
 #: Rows that the loops take at a time, GUARD_STRIP.
 STRIP = 3
 
-#: Longest function in multiply-adds; 16 bytes of flash for each.
+#: Longest functions in multiply-adds; 16 bytes of flash for each.
 MOST_TERMS = 360
+MOST_FUSION_TERMS = 640
 
 
 def advance(model: Model, kalman: Kalman, fusion: Fusion) -> Code | None:
@@ -152,24 +153,29 @@ def moved(S: Array, c: int, i: int, r: int, d: list[str]) -> list[str]:
     return statement(f"l[{c}] =", f"{value};")
 
 
-def fuse(fusion: Fusion, n: int) -> Code | None:
-    """blw_guard_fuse_kernel_t, where all modes are fused securely."""
-    n_u, N = fusion.Fu.shape
-    if n_u != n or 2 * n_u * N > MOST_TERMS:
+def fuse(fusion: Fusion, Xu: Array) -> Code | None:
+    """blw_guard_fuse_kernel_t."""
+    n, n_u = Xu.shape
+    N = len(fusion.Gu)
+    terms = 2 * n_u * N + (n * n_u if n_u < n else 0)
+    if n_u == 0 or terms > MOST_FUSION_TERMS:
         return None
-    Fu, Gu = straight.flushed(fusion.Fu), straight.flushed(fusion.Gu)
-    t, d = names("t", N), names("d", n)
+    Fu, Gu, Xu = (straight.flushed(M) for M in (fusion.Fu, fusion.Gu, Xu))
+    t, d = names("t", N), names("d", n_u)
     lines = loads("tau", t)
-    for a in range(n):
+    for a in range(n_u):
         lines += statement(f"const blw_real_t d{a} =", f"{total(Fu[a], t) or 'BLW_R(0.0)'};")
-    lines += [f"x_ref[{a}] = x_bar[{a}] + d{a};" for a in range(n)]
+    for a in range(n):
+        moved = f"d{a}" if n_u == n else f"({total(Xu[a], d)})"
+        lines += statement(f"x_ref[{a}] =",
+                           f"x_bar[{a}] + {moved};" if moved != "()" else f"x_bar[{a}];")
     for c in range(N):
         value = f"e[{c}]"
-        for start in range(0, n, STRIP):
+        for start in range(0, n_u, STRIP):
             part = total(-Gu[c, start : start + STRIP], d[start : start + STRIP])
             value += f" + ({part})" if part else ""
         lines += statement(f"eta[{c}] =", f"{value};")
     return Code("void",
                 "const blw_real_t *tau, const blw_real_t *e, const blw_real_t *x_bar,\n"
                 "    blw_real_t *x_ref, blw_real_t *eta", tuple(lines),
-                f"x_ref = x_bar + Fu tau, eta = e - Gu (x_ref - x_bar): {2 * n * N} multiply-adds")
+                f"x_ref = x_bar + Xu Fu tau, eta = e - Gu Fu tau: {terms} multiply-adds")

@@ -48,7 +48,7 @@ typedef void (*blw_guard_squares_kernel_t)(const blw_real_t *l, blw_real_t *squa
 /** average += gain (l - average), squares [m] = |average_i|^2 */
 typedef void (*blw_guard_average_kernel_t)(const blw_real_t *l, blw_real_t *average,
                                            blw_real_t *squares);
-/** x_ref of (4) and eta of (5) where all modes are fused securely. */
+/** x_ref of (4) and eta of (5). */
 typedef void (*blw_guard_fuse_kernel_t)(const blw_real_t *tau, const blw_real_t *e,
                                         const blw_real_t *x_bar, blw_real_t *x_ref,
                                         blw_real_t *eta);
@@ -91,11 +91,11 @@ typedef struct blw_guard_model {
                                         out of the sum; 0 if there is no such number */
     blw_real_t        omega;   /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
     blw_real_t        sigma;   /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
-    blw_guard_advance_kernel_t  advance; /**< all four may be NULL */
+    blw_guard_advance_kernel_t  advance; /**< as the next five may be NULL */
     blw_guard_multiply_kernel_t multiply;
     blw_guard_squares_kernel_t  squares;
     blw_guard_average_kernel_t  average;
-    blw_guard_fuse_kernel_t     fuse; /**< NULL if n_u < n */
+    blw_guard_fuse_kernel_t     fuse;
     blw_guard_move_kernel_t     move;
 } blw_guard_model_t;
 
