@@ -29,6 +29,14 @@ def write_files(folder: Path, contents: Mapping[str, str]) -> list[Path]:
     return list(temporary)
 
 
+def write_changed(folder: Path, contents: Mapping[str, str]) -> None:
+    """As write_files, but files that are as they should be keep their time."""
+    changed = {name: text for name, text in contents.items()
+               if not (folder / name).is_file()
+               or (folder / name).read_text(encoding="utf-8") != text}
+    write_files(folder, changed)
+
+
 def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)

@@ -14,6 +14,7 @@ from typing import Any
 
 import click
 
+from blw import pil
 from blw.atomic import write_files
 from blw.build import PRECISIONS, simulator
 from blw.design import design_all, document, json_text
@@ -26,6 +27,7 @@ from blw.progress import steps
 BAD_INPUT = 2
 EXISTING_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
 EVERY_METHOD = "all"
+PIL = "pil"
 
 
 def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
@@ -50,8 +52,12 @@ def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
 @click.argument("scenario", type=EXISTING_FILE)
 @_shared_options
 @click.option("--runs", type=click.IntRange(min=1), help="Number of runs, each with its own seed.")
-def run(scenario: Path, **options: Any) -> int:
+@click.option("--transport", type=click.Choice(("inproc", PIL)), default="inproc",
+              show_default=True, help="In one process; pil: also through firmware in QEMU.")
+def run(scenario: Path, transport: str, **options: Any) -> int:
     """Simulate SCENARIO (a TOML file) and write what every method made of it."""
+    if transport == PIL:
+        return run_with_firmware(scenario, **options)
     return run_scenario(scenario, **options)
 
 
@@ -107,6 +113,26 @@ def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METH
     if status != BAD_INPUT:
         write_files(out / "design", {name: text})
     return status
+
+
+def run_with_firmware(scenario: Path, out: Path, methods: Sequence[str], precision: str,
+                      **options: Any) -> int:
+    """As run_scenario for one method, then the same measurements through the example firmware.
+
+    Returns 1 if an answer of the firmware is missing or differs in a bit.
+    """
+    named = [name for name in methods if name != EVERY_METHOD]
+    if len(named) != 1 or precision != "f32" or options.get("runs"):
+        raise BulwarkError(f"--transport {PIL} takes one --method, float, and one run")
+    status = run_scenario(scenario, out, named, precision, **options)
+    if status != 0:
+        return status
+    design = design_all(load(_read_scenario(scenario)[0]), named)
+    outcome = pil.check(design, named[0], out)
+    click.echo(f"firmware: {outcome.steps} steps, {outcome.sent} frames there and "
+               f"{outcome.received} back, {outcome.lost} answers lost, {outcome.different} differ",
+               err=True)
+    return 0 if outcome.ok else 1
 
 
 def _read_scenario(scenario: Path) -> tuple[Path, str]:

@@ -15,7 +15,7 @@ import tomli_w
 from numpy.typing import NDArray
 
 from blw import kalman
-from blw.atomic import write_files
+from blw.atomic import write_changed, write_files
 from blw.build import BUILD, ROOT, StepFailed, simulator
 from blw.design import Design, design_all, document, json_text
 from blw.emit_c import files
@@ -97,7 +97,7 @@ def prepare(case: Case, steps: int | None = None) -> Prepared:
     folder = FOLDER / "cases" / case.name
     lines = [f"blw_add_replay({case.name} {method} {owner(design, method)})"
              for method in design.methods]
-    _write_changed(folder, {**files(design), "replays.cmake": "\n".join(lines) + "\n"})
+    write_changed(folder, {**files(design), "replays.cmake": "\n".join(lines) + "\n"})
     return Prepared(case, design, simulate(case, design, steps), folder)
 
 
@@ -138,10 +138,3 @@ def read_log(path: Path, design: Design) -> Log:
 def _columns(rows: list[dict[str, str]], names: Sequence[str]) -> NDArray[np.float64]:
     values = [[float(row[name] or "nan") for name in names] for row in rows]
     return np.array(values).reshape(len(rows), len(names))
-
-
-def _write_changed(folder: Path, contents: Mapping[str, str]) -> None:
-    """Leave files alone that are as they should be, so that nothing is built again for them."""
-    changed = {name: text for name, text in contents.items()
-               if not (folder / name).is_file() or (folder / name).read_text() != text}
-    write_files(folder, changed)
