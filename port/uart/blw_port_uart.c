@@ -37,13 +37,14 @@ static bool receive(blw_port_t *base, blw_frame_t *frame)
     transmit(self);
     while (uart_get(&byte)) {
         const blw_slcan_event_t event = blw_slcan_push(&self->slcan, byte, frame);
+        const bool              taken = (event == BLW_SLCAN_FRAME);
 
-        if (event == BLW_SLCAN_FRAME) {
+        if (taken || ((event == BLW_SLCAN_COMMAND) && (self->slcan.len > 0U))) {
+            (void)queue(self, &done, 1U); /* without room the host goes without */
+        }
+        if (taken) {
             frame->t_us = uart_clock_us();
             return true;
-        }
-        if ((event == BLW_SLCAN_COMMAND) && (self->slcan.len > 0U)) {
-            (void)queue(self, &done, 1U); /* without room the host asks again */
         }
     }
     return false;
