@@ -17,12 +17,22 @@ void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const 
 /** Copy row a of S_ij, i > j, to row [r]. */
 void blw_guard_row(const blw_guard_model_t *model, size_t i, size_t j, size_t a, blw_real_t *row);
 
+/** (1) with the samples in used; the others are replaced by their prediction. */
+void blw_guard_advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used);
 /** Check every table and dimension. */
 blw_status_t blw_guard_check(const blw_guard_model_t *model);
 
 /** Solve (2) from e [N] and l = S e; tau is left in self->eta.  Fills h, attacked, excluded.
  *  @return the bound on |x_hat - that of the minimiser|. */
 blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged);
+/** (9) of blw_guard_bound.c from e, tau and l with l' S^+ l = l' tau; BLW_REAL_MAX if the model has no
+ *  kappa.  Overwrites suspicion. */
+blw_real_t blw_guard_bound(blw_guard_t *self);
+/** The largest |h_i| of the sensors outside a set, 0 if there is none; and whose it is. */
+blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *sensor);
+/** The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
+ *  `margin` would not change the choice. */
+blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear);
 /** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors. */
 blw_mask_t blw_guard_search(blw_guard_t *self);
 /** Copy S_II, I = set of at most model->most sensors, to self->L.  @return its rows. */

@@ -178,6 +178,55 @@ bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
     return true;
 }
 
+blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
+{
+    const size_t m       = self->model->head.plant->m;
+    blw_real_t   largest = BLW_R(0.0);
+
+    for (size_t i = 0U; i < m; i++) {
+        if ((self->h[i] > largest) && !guard_has(set, i)) {
+            largest = self->h[i];
+            *sensor = i;
+        }
+    }
+    return largest;
+}
+
+/* Sensors of the unit of sensor i. */
+static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
+{
+    const size_t m   = model->head.plant->m;
+    blw_mask_t   set = guard_bit(i);
+
+    for (size_t j = 0U; (model->n_units < m) && (j < m); j++) {
+        set |= (model->unit[j] == model->unit[i]) ? guard_bit(j) : 0U;
+    }
+    return set;
+}
+
+blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear)
+{
+    const blw_guard_model_t *const model  = self->model;
+    const size_t                   p      = model->head.plant->p;
+    blw_mask_t                     chosen = 0U;
+    size_t                         sensor = 0U;
+    blw_real_t                     last   = BLW_REAL_MAX;
+
+    for (size_t taken = 0U; taken < p; taken++) {
+        const blw_real_t largest = blw_guard_largest(self, chosen, &sensor);
+
+        if (!(largest > model->exclude)) {
+            *clear = false;
+            return chosen;
+        }
+        last = largest;
+        chosen |= unit_of(model, sensor);
+    }
+    *clear = (last > (model->exclude + margin))
+             && ((last - blw_guard_largest(self, chosen, &sensor)) > margin);
+    return chosen;
+}
+
 /* Sensors of the units in `units`. */
 static blw_mask_t sensors_of(const blw_guard_model_t *model, blw_mask_t units)
 {

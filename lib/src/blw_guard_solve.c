@@ -1,18 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* Block coordinate descent on (2), exclusion, and the bound on what is left.
+/* Block coordinate descent on (2), and exclusion.
  *
  * Since S_ii = diag(I, 0), the minimum over nu_i alone is (3), and with s = min(1, k_i / |h_i|) it
  * moves tau_i, and l_i, by
  *     step = s h_i - l_i.                                                                    (7)
  * tau is kept rather than nu: it stays at noise size however large the attack, and a sensor that
  * leaves the support gets tau_i = e_i exactly.  What a gross attack has left in l by rounding is
- * removed by computing l = S tau again once nothing moves any more.
- *
- * Bound.  With |t l_i| <= k, t = min(1, min k / |l_i|), the duality gap of (2) is
- *     gap = (1 - t)^2 l' S^+ l / 2 + sum_i (k |nu_i| - t l_i' nu_i),                         (8)
- * the minimiser is within |nu - nu*|_S^2 <= 2 gap, and with Gu x + W z = nu - nu*, x = Fu (nu - nu*):
- *     |x_hat - x*| <= kappa (2 f / k + omega (2 gap)^(1/2)) + sigma (2 gap)^(1/2),           (9)
- * because sum_i k |nu_i| and sum_i k |nu_i*| are both at most the objective f. */
+ * removed by computing l = S tau again once nothing moves any more. */
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -205,58 +199,6 @@ static bool update(blw_guard_t *self, descent_t *descent)
     return true;
 }
 
-/* The largest |h_i| of the sensors outside a set, and whose it is. */
-static blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
-{
-    const size_t m       = self->model->head.plant->m;
-    blw_real_t   largest = BLW_R(0.0);
-
-    for (size_t i = 0U; i < m; i++) {
-        if ((self->h[i] > largest) && !guard_has(set, i)) {
-            largest = self->h[i];
-            *sensor = i;
-        }
-    }
-    return largest;
-}
-
-/* Sensors of the unit of sensor i. */
-static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
-{
-    const size_t m   = model->head.plant->m;
-    blw_mask_t   set = guard_bit(i);
-
-    for (size_t j = 0U; (model->n_units < m) && (j < m); j++) {
-        set |= (model->unit[j] == model->unit[i]) ? guard_bit(j) : 0U;
-    }
-    return set;
-}
-
-/* The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
- * `margin` would not change the choice. */
-static blw_mask_t choose_excluded(const blw_guard_t *self, blw_real_t margin, bool *clear)
-{
-    const blw_guard_model_t *const model  = self->model;
-    const size_t                   p      = model->head.plant->p;
-    blw_mask_t                     chosen = 0U;
-    size_t                         sensor = 0U;
-    blw_real_t                     last   = BLW_REAL_MAX;
-
-    for (size_t taken = 0U; taken < p; taken++) {
-        const blw_real_t largest = largest_outside(self, chosen, &sensor);
-
-        if (!(largest > model->exclude)) {
-            *clear = false;
-            return chosen;
-        }
-        last = largest;
-        chosen |= unit_of(model, sensor);
-    }
-    *clear = (last > (model->exclude + margin))
-             && ((last - largest_outside(self, chosen, &sensor)) > margin);
-    return chosen;
-}
-
 /* Descend until nothing moves, the choice is clear, or the limit is reached.  @return whether
  * nothing moves. */
 static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
@@ -279,7 +221,7 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
             continue;
         }
         if (!still && descent->decides && (self->updates > 0U)) {
-            descent->chosen = choose_excluded(self, CLEAR * descent->largest, &clear);
+            descent->chosen = blw_guard_choose(self, CLEAR * descent->largest, &clear);
         }
         if (clear) {
             return false;
@@ -362,67 +304,20 @@ static void exclude_at_once(blw_guard_t *self, descent_t *descent)
         return;
     }
     size_t           chosen  = 0U;
-    const blw_real_t largest = largest_outside(self, 0U, &chosen);
+    const blw_real_t largest = blw_guard_largest(self, 0U, &chosen);
     if (!(largest > (model->exclude + model->k + margin))) {
         return;
     }
     descent->gross = largest > (GROSS * model->k);
     exclude(self, guard_bit(chosen), descent);
     survey(self, descent);
-    size_t           i      = 0U;
-    const blw_real_t others = blw_la_max(model->exclude, largest_outside(self, self->excluded, &i));
-    descent->fresh          = (self->h[chosen] - others) > margin;
+    size_t           i = 0U;
+    const blw_real_t others =
+        blw_la_max(model->exclude, blw_guard_largest(self, self->excluded, &i));
+    descent->fresh = (self->h[chosen] - others) > margin;
     if (!descent->fresh) {
         self->excluded = 0U;
     }
-}
-
-/* sum_i k |nu_i| over the sensors with a penalty; *l_nu: sum_i l_i' nu_i. */
-static blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
-{
-    const size_t r     = self->model->r;
-    blw_real_t   total = BLW_R(0.0);
-    size_t       row   = 0U;
-
-    *l_nu = BLW_R(0.0);
-    for (blw_mask_t rest = self->attacked & ~self->excluded; rest != 0U; rest >>= 1) {
-        blw_real_t square = BLW_R(0.0);
-
-        for (size_t a = row; ((rest & 1U) != 0U) && (a < (row + r)); a++) {
-            const blw_real_t nu = self->e[a] - self->eta[a];
-
-            square += nu * nu;
-            *l_nu += self->l[a] * nu;
-        }
-        total += blw_la_sqrt(square);
-        row += r;
-    }
-    return self->model->k * total;
-}
-
-/* (9), where l' S^+ l = l' tau; BLW_REAL_MAX if the model has no kappa. */
-static blw_real_t bound_of(blw_guard_t *self)
-{
-    const blw_guard_model_t *const model   = self->model;
-    const size_t                   m       = model->head.plant->m;
-    blw_real_t                     largest = model->k * model->k; /* of k^2 and the |l_i|^2 */
-    blw_real_t                     l_nu    = BLW_R(0.0);
-
-    blw_guard_squares(model, self->l, self->suspicion); /* which judge_sensors() sets later */
-    for (size_t i = 0U; i < m; i++) {
-        largest = blw_la_max(largest, self->suspicion[i]);
-    }
-    const blw_real_t t       = blw_la_sqrt((model->k * model->k) / largest);
-    const blw_real_t penalty = penalty_of(self, &l_nu);
-    const blw_real_t product = blw_la_dot(m * model->r, self->l, self->eta);
-    const blw_real_t energy  = BLW_R(0.5) * blw_la_max(BLW_R(0.0), product);
-    const blw_real_t rest    = BLW_R(1.0) - t;
-    const blw_real_t gap     = (rest * rest * energy) + (penalty - (t * l_nu));
-    const blw_real_t root    = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), gap));
-    const blw_real_t size    = (BLW_R(2.0) * (energy + penalty)) / model->k;
-    const blw_real_t most = (model->kappa * (size + (model->omega * root))) + (model->sigma * root);
-    const bool       none = (model->n_u > 0U) && !(model->kappa > BLW_R(0.0));
-    return none ? BLW_REAL_MAX : most;
 }
 
 /* The first descent, and what it excludes.  @return that set. */
@@ -439,7 +334,8 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
     }
     *converged = descend(self, descent->decides ? limit : most, descent);
     if (descent->decides) {
-        set = (descent->chosen != 0U) ? descent->chosen : choose_excluded(self, BLW_R(0.0), &clear);
+        set =
+            (descent->chosen != 0U) ? descent->chosen : blw_guard_choose(self, BLW_R(0.0), &clear);
     }
     if ((set == 0U) && !*converged) {
         descent->decides = false;
@@ -470,5 +366,5 @@ blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
         self->excluded = 0U;
         *converged     = descend_without(self, blw_guard_search(self), most, &descent);
     }
-    return *converged ? descent.pending : bound_of(self);
+    return *converged ? descent.pending : blw_guard_bound(self);
 }

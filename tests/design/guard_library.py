@@ -15,7 +15,8 @@ from blw.tables import Struct
 
 LIB = Path(__file__).resolve().parents[2] / "lib"
 SOURCES = ("blw_la", "blw_model", "blw_step", "blw_guard", "blw_guard_check", "blw_guard_search",
-           "blw_guard_solve", "blw_guard_beside", "blw_guard_S")
+           "blw_guard_solve", "blw_guard_beside", "blw_guard_bound", "blw_guard_filters",
+           "blw_guard_S")
 FLAGS = ["-std=c99", "-ffp-contract=off", "-O2", "-fPIC", "-shared"]
 METHOD_GUARD = 7
 

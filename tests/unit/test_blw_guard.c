@@ -307,8 +307,13 @@ static void test_step_given_modes_that_decay_estimates_them_from_the_multipliers
     const double C   = (double)made.kalman.plant.C[0];
     step(benign, 6U); /* sensor 0 coasts on C A x_hat, xs above the reference's */
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, (0.25 * e_0) + (GUARD_S * C * A * xs), guard.e[0]);
-    step(gross, 7U);
-    TEST_ASSERT_TRUE(out.bound <= BLW_REAL_MAX);
+    made.model.max_updates = 1U;
+    made.model.sigma       = BLW_R(1.0);
+    start();
+    const blw_real_t y[3] = {BLW_R(40.0), BLW_R(-40.0), BLW_R(6.0)};
+    step(y, 7U);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_BOUND, out.outcome);
+    TEST_ASSERT_TRUE((out.bound > BLW_R(0.0)) && (out.bound < BLW_REAL_MAX));
 }
 
 int main(void)
