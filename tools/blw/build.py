@@ -35,12 +35,21 @@ def simulator(precision: str) -> Path:
 
     Raises StepFailed if it cannot be built.
     """
+    return _program("blw_sim", precision)
+
+
+def bus(precision: str) -> Path:
+    """The program of plant, node and attacker on a bus; as simulator()."""
+    return _program("blw_bus", precision)
+
+
+def _program(name: str, precision: str) -> Path:
     preset = f"host-{precision}"
     with _turn(preset):
         if not (BUILD / preset / "build.ninja").is_file():
             _configure(preset, tests=False)
-        _make(preset, "blw_sim")
-    return BUILD / preset / "host_sim" / "blw_sim"
+        _make(preset, name)
+    return BUILD / preset / "host_sim" / name
 
 
 def build(preset: str) -> Path:

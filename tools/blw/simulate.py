@@ -17,6 +17,7 @@ import click
 from blw import pil
 from blw.atomic import write_files
 from blw.build import PRECISIONS, simulator
+from blw.bus import LINKS, Place, run_on_bus
 from blw.design import design_all, document, json_text
 from blw.errors import BulwarkError
 from blw.logs import convert
@@ -52,13 +53,19 @@ def _shared_options(command: Callable[..., int]) -> Callable[..., int]:
 @click.argument("scenario", type=EXISTING_FILE)
 @_shared_options
 @click.option("--runs", type=click.IntRange(min=1), help="Number of runs, each with its own seed.")
-@click.option("--transport", type=click.Choice(("inproc", PIL)), default="inproc",
-              show_default=True, help="In one process; pil: also through firmware in QEMU.")
+@click.option("--transport", type=click.Choice(("inproc", PIL, *LINKS)), default="inproc",
+              show_default=True,
+              help="In one process; pil: also through firmware in QEMU; else plant, node and "
+                   "attacker on a bus.")
+@click.option("--link", metavar="LINK", help="The node's bus, if not the transport's usual one.")
+@click.option("--sensor-link", metavar="LINK", help="The sensors' bus, beyond the attacker.")
 def run(scenario: Path, transport: str, **options: Any) -> int:
     """Simulate SCENARIO (a TOML file) and write what every method made of it."""
     if transport == PIL:
+        if options.pop("link") or options.pop("sensor_link"):
+            raise BulwarkError("--link and --sensor-link do not go with --transport pil")
         return run_with_firmware(scenario, **options)
-    return run_scenario(scenario, **options)
+    return run_scenario(scenario, transport=transport, **options)
 
 
 @click.command()
@@ -97,9 +104,16 @@ def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METH
                  precision: str = "f32", **options: Any) -> int:
     """Design the scenario's model, simulate it, and write the results and the design into out.
 
-    options: seed, runs, as_json, as on the command line.  Returns the status of blw_sim, which
-    has said what was wrong if it is not 0.  Raises BulwarkError for a bad scenario or model.
+    options: seed, runs, as_json, transport, ..., as on the command line.  Returns the status of
+    the program behind it, which has said what was wrong if it is not 0.  Raises BulwarkError for a
+    bad scenario or model.
     """
+    transport = options.pop("transport", "inproc")
+    links = (options.pop("link", None), options.pop("sensor_link", None))
+    if transport == "inproc" and any(links):
+        raise BulwarkError("--link and --sensor-link need a --transport")
+    if transport != "inproc" and (options.get("runs") or options.get("compare")):
+        raise BulwarkError("--runs and --compare do not go with --transport: a bus has one run")
     model_path, controller = _read_scenario(scenario)
     model = load(model_path)
     with steps("design") as progress:
@@ -108,8 +122,13 @@ def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METH
     name = f"{model.name}.json"
     with tempfile.TemporaryDirectory(prefix="bulwark.") as folder:
         (design,) = write_files(Path(folder), {name: text})
-        arguments = _arguments({"design": design, "out": out, "methods": methods, **options})
-        status = subprocess.call([simulator(precision), "run", scenario, *arguments])
+        if transport == "inproc":
+            arguments = _arguments({"design": design, "out": out, "methods": methods, **options})
+            status = subprocess.call([simulator(precision), "run", scenario, *arguments])
+        else:
+            status = run_on_bus(scenario, design, out, methods, _speaker(methods, controller),
+                                Place.of(transport, *links), precision, options.get("seed"),
+                                bool(options.get("as_json")))
     if status != BAD_INPUT:
         write_files(out / "design", {name: text})
     return status
@@ -152,6 +171,13 @@ def _read_scenario(scenario: Path) -> tuple[Path, str]:
     controller = content.get("controller")
     method = controller.get("method") if isinstance(controller, dict) else None
     return scenario.parent / model, method if isinstance(method, str) else ""
+
+
+def _speaker(methods: Sequence[str], controller: str) -> str:
+    """The method that answers the plant: the controller's, else the first that was named."""
+    if controller in REGISTRY:
+        return controller
+    return "kalman" if EVERY_METHOD in methods else methods[0]
 
 
 def _wanted(methods: Sequence[str], controller: str) -> list[str] | None:
