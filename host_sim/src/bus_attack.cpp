@@ -23,9 +23,10 @@ namespace
 
 const int           WAIT_MS      = 1;
 const std::uint64_t SECOND       = 1000000U;
-const int           BABBLE       = 50;  /* frames at a time */
+const int           BABBLE       = 12;  /* frames at a time */
 const double        FORGED       = 1e3; /* far from any sample */
-const std::uint64_t ANOTHER_STEP = 3U;
+const std::uint64_t ANOTHER_STEP = 300U;
+const std::uint64_t FAR_AHEAD    = 100000U;
 const char *const   FAULTS[] = {"babble", "crc", "stale", "early", "duplicate", "sync", "garbage"};
 
 class BusAttacker
@@ -149,7 +150,7 @@ private:
     void take_sync(const blw_frame_t &frame)
     {
         blw_wire_sync_t sync;
-        if ((blw_wire_get_sync(&frame, &sync) == BLW_WIRE_OK)
+        if ((blw_wire_get_sync(&frame, &sync) == BLW_WIRE_OK) && (sync.k != own_sync_)
             && (sync.model == (model_ & BLW_WIRE_MODEL_BITS))) {
             if ((sync.k == BLW_WIRE_K_END) || (sync.k != k_)) {
                 attack(); /* the step before, if samples of it are missing */
@@ -271,7 +272,8 @@ private:
         } else if (fault == "early") {
             frame = value_frame(BLW_WIRE_MEASUREMENT, k_ + ANOTHER_STEP, 0U, FORGED);
         } else if (fault == "sync") {
-            frame = sync_frame(static_cast<std::uint32_t>(k_ + 1000U), model_);
+            own_sync_ = static_cast<std::uint32_t>(k_ + FAR_AHEAD); /* a link may hear itself */
+            frame     = sync_frame(own_sync_, model_);
         } else if (fault == "garbage") {
             frame.len = 5U;
         }
@@ -301,6 +303,7 @@ private:
     blw_mask_t               u_here_ = 0U;
     std::vector<blw_frame_t> waiting_;
     std::uint64_t            k_         = 0U;
+    std::uint32_t            own_sync_  = 0U;
     bool                     made_      = false;
     bool                     ended_     = false;
     std::uint64_t            steps_     = 0U;

@@ -258,6 +258,9 @@ bool deliver(Link &link, const blw_frame_t &frame)
         if (blw_port_send(link.port(), &frame)) {
             return true;
         }
+        if (link.down()) {
+            return false;
+        }
         (void)::poll(nullptr, 0U, ROOM_MS);
     }
     return false;

@@ -45,7 +45,8 @@ std::unique_ptr<Link> open_link(const std::string &where, const blw_plant_t &pla
 /** Until something can be received or the time is over. */
 void wait_for(const std::vector<Link *> &links, int time_ms);
 
-/** Send a frame, waiting for room for up to a second.  @return whether it was sent. */
+/** Send a frame, waiting for room for up to a second, but not for a lost link.
+ *  @return whether it was sent. */
 bool deliver(Link &link, const blw_frame_t &frame);
 
 /** The model's id on the bus: the first 32 bits of the SHA-256 of its file. */

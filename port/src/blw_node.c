@@ -109,13 +109,16 @@ static bool too_early(const blw_node_t *self, uint64_t t_us)
            && ((t_us - self->opened_us) < (self->config->period_us / 2U));
 }
 
-/* A sync out of turn counts only if the next one confirms it. */
+/* A sync out of turn counts only if most sensors followed it, and the next one confirms it. */
 static void doubt(blw_node_t *self, uint32_t k, uint64_t t_us)
 {
-    if (self->doubting && (k == (self->candidate + 1U))) {
+    const bool followed = (2U * blw_mask_count(self->followers)) > self->plant->m;
+
+    if (self->doubting && followed && (k == (self->candidate + 1U))) {
         join(self, k, t_us);
         return;
     }
+    self->followers = 0U;
     blw_node_count(&self->counters.bad_sync);
     self->events |= BLW_NODE_EVENT_TIME;
     self->candidate = k;

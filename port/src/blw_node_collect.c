@@ -142,6 +142,9 @@ static void take_sensor(blw_node_t *self, const blw_wire_values_t *values, size_
     if (part == 0U) {
         hear(self, sensor);
     }
+    if (self->doubting && (age(values->seq, self->candidate) == 0)) {
+        self->followers |= (blw_mask_t)1U << sensor;
+    }
     if (steps == 0) {
         take_sample(self, sensor, part, valid, value);
     } else if ((steps == -1) && valid) {

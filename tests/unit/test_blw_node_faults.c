@@ -260,6 +260,21 @@ static void test_poll_given_false_syncs_keeps_its_time_and_says_so(void)
     TEST_ASSERT_EQUAL_UINT32(1U, bench.node.counters.restarts);
 }
 
+static void test_poll_given_false_syncs_in_a_row_waits_for_the_sensors_to_follow(void)
+{
+    bench.config.period_us = 0U; /* no clock that could find them too early */
+    for (uint32_t k = 1000U; k < 1010U; k++) {
+        bench_sync(&bench, k);
+        bench_value(&bench, BLW_WIRE_MEASUREMENT, k, 0U, 1.0F); /* one liar is not most sensors */
+    }
+    bench_expect_none(&bench);
+    bench_send_step(&bench, 2U);
+    const blw_node_report_t *const report = bench_expect(&bench, 2U);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, undisturbed, report->out.x_hat[0]);
+    TEST_ASSERT_EQUAL_UINT32(10U, bench.node.counters.bad_sync);
+    TEST_ASSERT_EQUAL_UINT32(1U, bench.node.counters.restarts);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -276,5 +291,6 @@ int main(void)
     RUN_TEST(test_poll_given_a_babbling_sensor_still_steps_in_time_and_says_so);
     RUN_TEST(test_poll_given_a_flood_makes_its_steps_in_time);
     RUN_TEST(test_poll_given_false_syncs_keeps_its_time_and_says_so);
+    RUN_TEST(test_poll_given_false_syncs_in_a_row_waits_for_the_sensors_to_follow);
     return UNITY_END();
 }

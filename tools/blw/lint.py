@@ -15,7 +15,7 @@ from blw.tally import Tally
 
 LLVM = "14"  # Debian 12's; another version formats differently
 SHELL = ("tools/bulwark", "tools/setup/setup.sh", "tools/check_archive.sh", ".ci/run",
-         "tests/archive/test_check_archive.sh")
+         "tests/archive/test_check_archive.sh", "tests/bus/in_netns.sh", "tests/bus/in_uml.sh")
 
 
 def run() -> Tally:

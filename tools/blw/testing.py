@@ -20,7 +20,7 @@ from blw.options import suggestion
 from blw.tally import Tally
 
 PRESETS = ("host-f32", "host-f64", "asan", "clang-f32")
-SUITES = ("design", "program")
+SUITES = ("design", "program", "bus")
 TARGET = "target"
 LINT = "lint"
 COVERAGE = "coverage"
@@ -105,6 +105,7 @@ def _on_target(name: str) -> Tally:
 
 def _pytest(suite: str) -> Tally:
     command = [sys.executable, "-m", "pytest", "--quiet", "-rs", "-n", str(os.cpu_count()),
+               "--dist", "loadfile" if suite == "bus" else "load",  # a bus is set up once
                str(ROOT / "tests" / suite)]
     return _with_junit(command, BUILD / f"{suite}.xml", "--junitxml")
 

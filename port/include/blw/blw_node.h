@@ -5,8 +5,8 @@
  *  inputs u(k-1) until all are there (and settle_us more have passed) or deadline_us after the sync.
  *  What is missing then is missing for the estimator; a missing input keeps its last value, as its
  *  actuator does.  If no sync comes for a period, the node goes on by its own clock.  A sync out of
- *  turn is believed only when the next one confirms it: then the node steps blind over a gap of at
- *  most max_gap steps, and resets its estimator for anything else.
+ *  turn is believed only when most sensors follow it and the next sync confirms it: then the node
+ *  steps blind over a gap of at most max_gap steps, and resets its estimator for anything else.
  *
  *  Several frames of one sensor for one step.  Equal values are counted (duplicate) and harmless.
  *  Different values are a contradiction: nobody can tell which is true, so neither is used, the
@@ -104,6 +104,7 @@ typedef struct blw_node {
     blw_mask_t               complete;                         /* sensors of which all is here */
     blw_mask_t               complete_last;                    /* the same for the last step */
     blw_mask_t               absent;                           /* that said they have no sample */
+    blw_mask_t               followers;                        /* sensors that follow a candidate */
     blw_mask_t               conflict;                         /* sensors in contradiction */
     uint8_t                  parts[BLW_MAX_SENSORS];           /* values here, <= width */
     uint8_t                  frames[BLW_MAX_SENSORS];          /* values heard in this step */

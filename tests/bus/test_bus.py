@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: MIT
+"""Plant, nodes and attackers on LCM, CAN and CAN FD: counts and bits, never times."""
+
+import csv
+from pathlib import Path
+
+import pytest
+from conftest import Prepared, Recorded
+
+#: Fault -> counter of the node that has to tell it.
+COUNTERS = {"babble": "babbling", "crc": "bad_crc", "stale": "stale", "early": "out_of_order",
+            "duplicate": "duplicate", "sync": "bad_sync", "garbage": "bad_layout"}
+SENSORS = 4
+INPUTS = 1
+FAR = 0.3
+
+
+def case(recorded: Recorded, name: str) -> dict:
+    if name not in recorded.cases:
+        pytest.skip(f"{recorded.transport}: the case is run on the other transports")
+    return recorded.cases[name]
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def clean(node: dict) -> bool:
+    """Nothing went wrong that a node counts."""
+    harmless = ("steps", "taken", "restarts", "link")
+    return all(count == 0 for name, count in node.items() if name not in harmless)
+
+
+@pytest.mark.parametrize("method", ["kalman", "guard"])
+def test_node_on_a_bus_given_no_fault_yields_the_bits_of_one_process(
+        recorded: Recorded, prepared: Prepared, method: str) -> None:
+    case(recorded, "lockstep")
+    written = (recorded.out / "lockstep" / f"{method}.csv").read_bytes()
+    assert written == (prepared.inproc / "benign" / f"{method}.csv").read_bytes()
+
+
+def test_paced_run_loses_and_reorders_nothing(recorded: Recorded) -> None:
+    paced = case(recorded, "paced")
+    node = paced["node"]["kalman"]
+    assert paced["status"] == [0, 0]
+    assert node["steps"] == paced["steps"] == paced["plant"]["steps"]
+    assert node["taken"] == paced["steps"] * (SENSORS + INPUTS)
+    assert clean(node)
+    assert paced["plant"]["unsent"] == 0
+
+
+def test_restarted_node_catches_up(recorded: Recorded) -> None:
+    again = case(recorded, "restart")
+    assert again["status"] == [0, 0, 0]
+    whole = rows(recorded.out / "witness" / "guard.csv")
+    late = rows(recorded.out / "restart" / "guard.csv")
+    assert len(whole) == 400
+    assert 50 < len(late) < 400
+    assert late[-1]["k"] == whole[-1]["k"] == "400"
+    for state in ("cart_m", "angle_rad"):
+        assert float(late[-1][state]) == pytest.approx(float(whole[-1][state]), abs=1e-4)
+
+
+@pytest.mark.parametrize("fault", COUNTERS)
+def test_faulty_neighbour_changes_no_estimate_and_is_told(recorded: Recorded, prepared: Prepared,
+                                                          fault: str) -> None:
+    node = case(recorded, fault)["node"]["guard"]
+    counter = COUNTERS[fault]
+    if recorded.transport == "lcm" and fault in ("crc", "garbage"):
+        pytest.skip("LCM has no such frame to send")
+    assert node[counter] >= 50, node
+    assert node["conflict"] == 0
+    written = (recorded.out / fault / "guard.csv").read_bytes()
+    assert written == (prepared.inproc / "benign" / "guard.csv").read_bytes()
+
+
+def test_intruder_silences_his_victim_but_does_not_speak_for_it(recorded: Recorded) -> None:
+    node = case(recorded, "intruder")["node"]["guard"]
+    assert node["conflict"] >= 50
+    estimates = rows(recorded.out / "intruder" / "guard.csv")
+    truth = rows(recorded.out / "intruder.plant" / "log.csv")[1:]
+    silenced = [row for row in estimates[100:200] if "missing" in row["status"]]
+    assert len(silenced) >= 80
+    for row, true in zip(estimates, truth, strict=True):
+        assert abs(float(row["cart_m"]) - float(true["x:cart_m"])) < FAR
+
+
+def test_gateway_attacks_as_in_one_process(recorded: Recorded, prepared: Prepared) -> None:
+    case(recorded, "gateway")
+    there = rows(recorded.out / "gateway" / "guard.csv")
+    here = rows(prepared.inproc / "bias" / "guard.csv")
+    assert [row["excluded"] for row in there] == [row["excluded"] for row in here]
+    assert any(row["excluded"] == "cart2" for row in there[100:200])
+    for one, other in zip(there, here, strict=True):
+        assert float(one["cart_m"]) == pytest.approx(float(other["cart_m"]), abs=1e-5)
+
+
+def test_suppressed_sensor_is_missing_as_in_one_process(recorded: Recorded,
+                                                       prepared: Prepared) -> None:
+    node = case(recorded, "suppressed")["node"]["guard"]
+    there = rows(recorded.out / "suppressed" / "guard.csv")
+    here = rows(prepared.inproc / "drop" / "guard.csv")
+    assert [row["status"] for row in there] == [row["status"] for row in here]
+    assert sum("missing" in row["status"] for row in there) == 100
+    assert node["lost"] == (100 if recorded.transport == "can" else 0)  # LCM says "no sample"
+
+
+def test_node_of_another_model_refuses(recorded: Recorded) -> None:
+    done = case(recorded, "other_model")
+    assert done["status"] == [0, 0, 1]
+    assert "no plant of model pendulum was heard" in done["said"][2]
+    assert clean(done["node"]["guard"])
+
+
+def test_lost_link_is_reported_and_recovered(recorded: Recorded) -> None:
+    done = case(recorded, "link_lost")
+    node = done["node"]["guard"]
+    assert done["status"][0] == 0
+    assert node["blind"] >= 5
+    assert node["no_sync"] >= 5
+    assert done["plant"]["link"]["lost"] >= 1
+    assert node["steps"] - node["blind"] >= 60
+    assert "blind" not in rows(recorded.out / "link_lost" / "guard.csv")[-1]["status"]
