@@ -34,5 +34,6 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_support.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_la.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_lasso.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_local.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_model.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_step.c)

@@ -3,7 +3,8 @@
  *
  *  The plant sends sync, inputs and measurements of one step after the other, and waits for the
  *  answer of a node that has its model (or does not wait: pace_us).  A node process holds one node
- *  per method, all on the bus; the speaker alone sends.  The attacker is either a gateway, between
+ *  per method, all on the bus; the speaker alone sends.  In a split deployment one process per
+ *  sensor runs the local filter, and a fusion node takes what they send.  The attacker is either a gateway, between
  *  the sensors' link and the node's, that changes, withholds and delays what it holds; or an
  *  intruder on the node's link, that sends frames with its victims' identifiers.
  *
@@ -11,8 +12,10 @@
  */
 #ifndef BLW_SIM_BUS_H
 #define BLW_SIM_BUS_H
+#include "blw/blw_lasso.h"
 #include "commands.h"
 #include "link.h"
+#include "methods.h"
 #include <atomic>
 #include <string>
 
@@ -35,12 +38,18 @@ struct BusOptions {
     std::uint16_t quarantine  = 20U;
     std::uint16_t max_gap     = 100U;
     bool          mute        = false; /* node: nobody speaks */
+    bool          fusion      = false; /* node: takes local states for samples */
+    std::string   sensor;              /* node: only the local filter of this sensor */
 };
 
 /** Exit status: 0; 1 if the plant diverged, a node heard no run, or nobody answered. */
 int plant_command(const BusOptions &options);
 int node_command(const BusOptions &options);
 int attack_command(const BusOptions &options);
+/** node_command() with options.sensor. */
+int station_command(const BusOptions &options);
+/** The tables of `lasso` or `canonical`; InputError for another method. */
+const blw_lasso_model_t &split_model(const Estimator &estimator);
 
 /** Set by SIGINT and SIGTERM: end in good order. */
 extern std::atomic<bool> bus_interrupted;

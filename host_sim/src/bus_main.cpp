@@ -79,6 +79,9 @@ CLI::App *add_node(CLI::App &app, sim::BusOptions &options)
         ->capture_default_str();
     node->add_option("--max-gap", options.max_gap, "Steps made up for blindly")
         ->capture_default_str();
+    node->add_flag("--fusion", options.fusion, "Take the sensors' local states for samples");
+    node->add_option("--sensor", options.sensor, "Run the local filter of this sensor, no more")
+        ->excludes("--fusion");
     CLI::Option *scenario =
         node->add_option("--scenario", options.run.input, "Score against this scenario, and");
     node->add_option("--log", options.log, "the plant's log.csv of the same run")->needs(scenario);

@@ -68,9 +68,12 @@ class MethodNode
 public:
     MethodNode(const BusOptions &options, const Design &design, const Plant &plant,
                const std::string &method, bool speaks)
-        : design_(design), link_(open_link(options.link, plant.tables, 1U)), mute_(link_->port()),
-          estimator_(design, plant, method), trace_{method, {}, estimator_.extra_columns()},
-          memory_(BLW_NODE_MEM(design.m, 1U, design.l))
+        : design_(design),
+          estimator_(design, plant, method, options.fusion ? &blw_lasso_fusion_ops : nullptr),
+          width_(options.fusion ? split_model(estimator_).jordan->r : std::uint8_t{1}),
+          link_(open_link(options.link, plant.tables, width_)),
+          mute_(link_->port()), trace_{method, {}, estimator_.extra_columns()},
+          memory_(BLW_NODE_MEM(design.m, width_, design.l))
     {
         config_.model          = model_id(design.model_sha256);
         config_.period_us      = options.period_us;
@@ -79,8 +82,8 @@ public:
         config_.quarantine     = options.quarantine;
         config_.max_gap        = options.max_gap;
         config_.babbling       = BABBLING;
-        config_.collects       = BLW_WIRE_MEASUREMENT;
-        config_.width          = 1U;
+        config_.collects       = options.fusion ? BLW_WIRE_ZETA : BLW_WIRE_MEASUREMENT;
+        config_.width          = width_;
         config_.format         = static_cast<std::uint8_t>(link_->format());
         blw_port_t *const port = speaks ? link_->port() : mute_.port();
         if (blw_node_init(&node_, &config_, &plant.tables, estimator_.handle(), port,
@@ -142,9 +145,10 @@ public:
 
 private:
     const Design           &design_;
+    Estimator               estimator_;
+    std::uint8_t            width_;
     std::unique_ptr<Link>   link_;
     Mute                    mute_;
-    Estimator               estimator_;
     Trace                   trace_;
     blw_node_config_t       config_{};
     std::vector<blw_real_t> memory_;
@@ -248,12 +252,27 @@ void score_run(const BusOptions &options, const Design &design, const Nodes &nod
 
 } // namespace
 
+const blw_lasso_model_t &split_model(const Estimator &estimator)
+{
+    if ((estimator.model().method != BLW_METHOD_LASSO)
+        && (estimator.model().method != BLW_METHOD_CANONICAL)) {
+        throw InputError("method " + estimator.name()
+                         + " cannot be split between sensors and a fusion node; lasso and "
+                           "canonical can");
+    }
+    return reinterpret_cast<const blw_lasso_model_t &>(estimator.model());
+}
+
 int node_command(const BusOptions &options)
 {
-    const Design                   design  = load_design(options.run.design);
-    const std::unique_ptr<Plant>   plant   = load_plant(design);
-    const std::vector<std::string> methods = choose_methods(options.run, design, options.speaker);
-    const Nodes                    nodes   = make_nodes(options, design, *plant, methods);
+    if (!options.sensor.empty()) {
+        return station_command(options);
+    }
+    const Design                   design = load_design(options.run.design);
+    const std::unique_ptr<Plant>   plant  = load_plant(design);
+    const std::vector<std::string> methods =
+        options.fusion ? options.run.methods : choose_methods(options.run, design, options.speaker);
+    const Nodes nodes = make_nodes(options, design, *plant, methods);
     say_listening("node", options.link);
     listen(nodes, options.idle_s);
 

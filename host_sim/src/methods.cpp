@@ -91,12 +91,14 @@ std::unique_ptr<Plant> load_plant(const Design &design)
     return plant;
 }
 
-Estimator::Estimator(const Design &design, const Plant &plant, const std::string &name)
+Estimator::Estimator(const Design &design, const Plant &plant, const std::string &name,
+                     const blw_estimator_ops_t *ops)
     : name_(name), u_(design.l), y_(design.m)
 {
-    const Method     &method = find_method(name);
-    const JsonNode    node   = design.method(name).member("tables");
-    blw_table_check_t walk;
+    const Method                    &method = find_method(name);
+    const blw_estimator_ops_t *const used   = (ops != nullptr) ? ops : method.ops;
+    const JsonNode                   node   = design.method(name).member("tables");
+    blw_table_check_t                walk;
     blw_model_t head = {BLW_MODEL_ABI, static_cast<std::uint8_t>(method.id), 0U, &plant.tables};
     if (blw_model_begin(&head, method.id, &walk) != BLW_OK) {
         throw InputError(design.path + ": plant: the library refuses the plant's tables");
@@ -105,11 +107,11 @@ Estimator::Estimator(const Design &design, const Plant &plant, const std::string
     tables_         = method.load(reader, plant.tables);
     head.crc        = walk.crc;
     tables_->head() = head;
-    memory_.resize(method.ops->mem_len(&tables_->head()));
+    memory_.resize(used->mem_len(&tables_->head()));
     const std::size_t unit = sizeof(std::max_align_t);
-    state_.resize((method.ops->state_size + unit - 1U) / unit);
+    state_.resize((used->state_size + unit - 1U) / unit);
     const blw_status_t status =
-        blw_estimator_init(self(), method.ops, &tables_->head(), memory_.data(), memory_.size());
+        blw_estimator_init(self(), used, &tables_->head(), memory_.data(), memory_.size());
     if (status != BLW_OK) {
         node.fail(std::string("the library refuses these tables: ") + reason(status));
     }

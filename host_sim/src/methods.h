@@ -62,8 +62,10 @@ std::unique_ptr<Plant> load_plant(const Design &design);
 class Estimator
 {
 public:
-    /** InputError if the design lacks the method or the library refuses its tables. */
-    Estimator(const Design &design, const Plant &plant, const std::string &name);
+    /** InputError if the design lacks the method or the library refuses its tables.
+     *  @param ops instead of the method's own, on the same tables */
+    Estimator(const Design &design, const Plant &plant, const std::string &name,
+              const blw_estimator_ops_t *ops = nullptr);
 
     const std::string &name() const
     {
@@ -79,6 +81,11 @@ public:
     /** One step with u(k-1) [l], y(k) [m]; the result holds until the next call. */
     const blw_estimator_out_t &step(const Eigen::VectorXd &u, const Eigen::VectorXd &y,
                                     blw_mask_t valid);
+    /** Its tables, the head of the method's model. */
+    const blw_model_t &model() const
+    {
+        return tables_->head();
+    }
     /** The estimator itself, for a node. */
     blw_estimator_t *handle()
     {

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_lasso.h"
 #include "blw_la.h"
+#include "blw_lasso_internal.h"
 #include "blw_step.h"
 
 /* Method and P belong together: without P the states are fused as they are. */
@@ -21,7 +22,7 @@ static bool sizes_ok(const blw_lasso_model_t *model)
            && (model->ambiguous <= 1U);
 }
 
-static blw_status_t check_model(const blw_lasso_model_t *model)
+blw_status_t blw_lasso_check(const blw_lasso_model_t *model)
 {
     blw_table_check_t check;
     blw_status_t      status = BLW_ERR_MODEL;
@@ -62,7 +63,7 @@ blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, b
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
     }
-    const blw_status_t status = check_model(model);
+    const blw_status_t status = blw_lasso_check(model);
     if (status != BLW_OK) {
         return status;
     }
@@ -114,16 +115,15 @@ static bool transform_sensor(blw_lasso_t *self, size_t i)
     return blw_la_bounded(r, zeta_i) && blw_la_bounded(r, xi_i);
 }
 
-/* All local filters to step k, on the innovations.  A filter that a sample throws out of bounds
- * starts again from the prediction, and the sample counts as missing.
+/* xi of all sensors.  A filter that a sample throws out of bounds starts again from the prediction,
+ * and the sample counts as missing.
  * @return the samples that were taken in. */
-static blw_mask_t advance_filters(blw_lasso_t *self, blw_mask_t used)
+static blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used)
 {
     const blw_jordan_model_t *const jordan = self->model->jordan;
     const size_t                    r      = jordan->r;
     blw_mask_t                      taken  = used;
 
-    blw_jordan_step(jordan, NULL, self->e, self->zeta);
     for (size_t i = 0U; i < jordan->m; i++) {
         if (!transform_sensor(self, i)) {
             blw_la_fill(r, BLW_R(0.0), &self->zeta[i * r]);
@@ -196,6 +196,21 @@ static void report(const blw_lasso_t *self, const blw_l1_info_t *info, blw_mask_
     }
 }
 
+/* From the local filters at step k to the estimate. */
+static void fuse(blw_lasso_t *self, blw_mask_t advanced, blw_estimator_out_t *out)
+{
+    blw_l1_info_t info;
+    blw_mask_t    used = transform_filters(self, advanced);
+
+    blw_l1_solve(&self->l1, self->xi, self->d, &info);
+    judge_sensors(self, used);
+    if (!move_reference(self)) {
+        used = 0U;
+        judge_sensors(self, used);
+    }
+    report(self, &info, used, out);
+}
+
 blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_real_t *y,
                             blw_mask_t valid, blw_estimator_out_t *out)
 {
@@ -207,19 +222,43 @@ blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_re
     if (status != BLW_OK) {
         return status;
     }
-    blw_l1_info_t info;
-    blw_mask_t    used = blw_plant_screen(plant, y, valid);
+    const blw_mask_t used = blw_plant_screen(plant, y, valid);
 
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
     blw_plant_innovate(plant, y, used, self->x_bar, self->e);
-    used = advance_filters(self, used);
-    blw_l1_solve(&self->l1, self->xi, self->d, &info);
-    judge_sensors(self, used);
-    if (!move_reference(self)) {
-        used = 0U;
-        judge_sensors(self, used);
+    blw_jordan_step(self->model->jordan, NULL, self->e, self->zeta);
+    fuse(self, used, out);
+    return BLW_OK;
+}
+
+/* The filters that were sent; one that was not goes on without a sample. */
+static void take_filters(blw_lasso_t *self, const blw_real_t *zeta, blw_mask_t valid)
+{
+    const size_t r = self->model->jordan->r;
+
+    for (size_t i = 0U; i < self->model->jordan->m; i++) {
+        if (((valid >> i) & 1U) != 0U) {
+            blw_la_copy(r, &zeta[i * r], &self->zeta[i * r]);
+        } else {
+            blw_jordan_step_sensor(self->model->jordan, i, NULL, BLW_R(0.0), &self->zeta[i * r]);
+        }
     }
-    report(self, &info, used, out);
+}
+
+blw_status_t blw_lasso_fuse(blw_lasso_t *self, const blw_real_t *u, const blw_real_t *zeta,
+                            blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, zeta, valid);
+    if (status != BLW_OK) {
+        return status;
+    }
+    blw_plant_predict(plant, self->x_hat, u, self->x_bar);
+    take_filters(self, zeta, valid);
+    fuse(self, valid, out);
     return BLW_OK;
 }
 
@@ -253,6 +292,12 @@ static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const b
     return blw_lasso_step((blw_lasso_t *)(void *)self, u, y, valid, out);
 }
 
+static blw_status_t ops_fuse(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *zeta,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    return blw_lasso_fuse((blw_lasso_t *)(void *)self, u, zeta, valid, out);
+}
+
 const blw_estimator_ops_t blw_lasso_ops = {
     .method     = BLW_METHOD_LASSO,
     .state_size = sizeof(blw_lasso_t),
@@ -260,4 +305,24 @@ const blw_estimator_ops_t blw_lasso_ops = {
     .init       = ops_init,
     .reset      = ops_reset,
     .step       = ops_step,
+};
+
+static blw_status_t ops_init_fusion(blw_estimator_t *self, const blw_model_t *model,
+                                    blw_real_t *mem, size_t mem_len)
+{
+    const blw_status_t status = ops_init(self, model, mem, mem_len);
+
+    if (status == BLW_OK) {
+        self->ops = &blw_lasso_fusion_ops;
+    }
+    return status;
+}
+
+const blw_estimator_ops_t blw_lasso_fusion_ops = {
+    .method     = BLW_METHOD_LASSO,
+    .state_size = sizeof(blw_lasso_t),
+    .mem_len    = ops_mem_len,
+    .init       = ops_init_fusion,
+    .reset      = ops_reset,
+    .step       = ops_fuse,
 };

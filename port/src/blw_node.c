@@ -242,6 +242,9 @@ static bool listen(blw_node_t *self)
         if (take(self, &frame)) {
             return true;
         }
+        if (self->ended && !self->open) {
+            break; /* the owner shall see it before anybody begins a new run */
+        }
     }
     return false;
 }

@@ -7,6 +7,9 @@
 /** Count up, but not over. */
 void blw_node_count(uint32_t *counter);
 
+/** As a float: a double may be out of its range. */
+float blw_node_narrow(blw_real_t value);
+
 /** Make room for step k: nothing received yet. */
 void blw_node_clear(blw_node_t *self);
 /** Take a measurement, zeta or input frame. */

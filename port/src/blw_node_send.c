@@ -2,8 +2,7 @@
 #include <float.h>
 #include "blw_node_internal.h"
 
-/* In range of a float: a double may not be. */
-static float narrow(blw_real_t value)
+float blw_node_narrow(blw_real_t value)
 {
     const blw_real_t most = (blw_real_t)FLT_MAX;
 
@@ -37,7 +36,7 @@ static void make_estimate(const blw_node_t *self, size_t number, blw_frame_t *fr
 
     values.valid = (uint16_t)((1U << values.count) - 1U);
     for (size_t j = 0U; j < values.count; j++) {
-        values.value[j] = narrow(self->report.out.x_hat[first + j]);
+        values.value[j] = blw_node_narrow(self->report.out.x_hat[first + j]);
     }
     (void)blw_wire_put_values(&values, (blw_wire_format_t)self->config->format, frame);
 }
@@ -53,7 +52,7 @@ static void make_status(const blw_node_t *self, blw_frame_t *frame)
                        .iterations = (uint8_t)((out->iterations < UINT8_MAX) ? out->iterations : UINT8_MAX)};
 
     for (size_t j = 0U; j < self->plant->n; j++) {
-        const float value = narrow(out->x_hat[j]);
+        const float value = blw_node_narrow(out->x_hat[j]);
         status.estimate   = blw_wire_sum_values(status.estimate, &value, 1U);
     }
     blw_wire_put_status(&status, frame);

@@ -63,8 +63,9 @@ def call(command: list[object]) -> subprocess.CompletedProcess:
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
     folder = tmp_path_factory.mktemp("bus")
     for model in (MODEL, OTHER_MODEL):
-        done = call([sys.executable, "-m", "blw", "design", model, "--out", folder, "--method",
-                     "guard"])
+        wanted = ("guard", "lasso", "canonical") if model == MODEL else ("guard",)
+        done = call([sys.executable, "-m", "blw", "design", model, "--out", folder,
+                     *(word for method in wanted for word in ("--method", method))])
         assert done.returncode == 0, done.stderr
     (folder / "short.toml").write_text(BENIGN.replace("steps = 400", "steps = 120"))
     made = Prepared(folder / f"{MODEL.stem}.json", folder / f"{OTHER_MODEL.stem}.json", folder,

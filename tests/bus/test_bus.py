@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Plant, nodes and attackers on LCM, CAN and CAN FD: counts and bits, never times."""
+"""Plant, nodes and attackers on LCM, CAN and CAN FD: counts and bits, never times.
+
+BULWARK_FRAMES is the length of the paced run, 10000 if it is not set.
+"""
 
 import csv
 from pathlib import Path
@@ -84,6 +87,17 @@ def test_intruder_silences_his_victim_but_does_not_speak_for_it(recorded: Record
     assert len(silenced) >= 80
     for row, true in zip(estimates, truth, strict=True):
         assert abs(float(row["cart_m"]) - float(true["x:cart_m"])) < FAR
+
+
+@pytest.mark.parametrize("method", ["lasso", "canonical"])
+def test_split_deployment_yields_the_bits_of_the_central_node(recorded: Recorded,
+                                                              method: str) -> None:
+    done = case(recorded, f"split_{method}")
+    assert done["status"] == [0] * 8
+    written = (recorded.out / f"split_{method}" / f"{method}.csv").read_bytes()
+    assert written == (recorded.out / f"split_{method}.central" / f"{method}.csv").read_bytes()
+    assert done["node"][method]["taken"] == 400 * (SENSORS * SENSORS + INPUTS)  # r = n = 4
+    assert clean(done["node"][method])
 
 
 def test_gateway_attacks_as_in_one_process(recorded: Recorded, prepared: Prepared) -> None:
