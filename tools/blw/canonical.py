@@ -79,7 +79,15 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
 def assemble(model: Model, kalman: Kalman, options: Options, weights: Array,
              filters: LocalFilters, modes: Modes, P: Array) -> Designed:
     """Tables and figures for given transforms P [m x n x n] with P_i G_i X = H_i."""
-    m, n = model.m, model.n
+    fused = fusion(weights, filters, modes, P)
+    designed = lasso.assemble(NAME, fused, filters, model, kalman, options)
+    return Designed(designed.tables, designed.info | figures(model, options, weights, modes, P),
+                    designed.mem)
+
+
+def fusion(weights: Array, filters: LocalFilters, modes: Modes, P: Array) -> lasso.Fusion:
+    """The problem (1) in reduced form for given transforms P [m x n x n]."""
+    m, n = P.shape[:2]
     local = modes.form.groups()
     rows = [slice(i * n + first, i * n + first + size) for i in range(m) for first, size in local]
     stacked = scipy.linalg.block_diag(*P)
@@ -88,7 +96,7 @@ def assemble(model: Model, kalman: Kalman, options: Options, weights: Array,
     reduced = l1.reduced((M + M.T) / 2.0, H, rows)
     deviation = np.sqrt(np.diag(filters.W)).reshape(m, n)
     filter_scale = 1.0 / block_means(filters, deviation).ravel()
-    fusion = lasso.Fusion(
+    return lasso.Fusion(
         reduced=reduced,
         groups=l1.sensor_groups(local, m, n, weights),
         F=np.linalg.solve(stacked.T, filters.F.T).T,
@@ -97,9 +105,6 @@ def assemble(model: Model, kalman: Kalman, options: Options, weights: Array,
         P=reduced.scale.reshape(m, n, 1) * P / filter_scale.reshape(m, 1, n),
         ambiguous=ambiguous(weights, modes),
     )
-    designed = lasso.assemble(NAME, fusion, filters, model, kalman, options)
-    return Designed(designed.tables, designed.info | figures(model, options, weights, modes, P),
-                    designed.mem)
 
 
 def figures(model: Model, options: Options, weights: Array, modes: Modes, P: Array) -> dict:

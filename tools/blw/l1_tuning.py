@@ -38,15 +38,20 @@ _STEP = 4.0
 
 
 class BenignLoss:
-    """loss(gamma) of (1) for one fusion; F [n x N] unscaled, trace_P the trace of P."""
+    """loss(gamma) of (1) for one fusion; F [n x N] unscaled, trace_P the trace of P.
 
-    def __init__(self, reduced: Reduced, groups: Groups, F: Array, trace_P: float) -> None:
+    Where (1) has many minimisers, rho and passes of ADMM decide which one is meant.
+    """
+
+    def __init__(self, reduced: Reduced, groups: Groups, F: Array, trace_P: float,
+                 rho: float = _RHO, passes: int = _PASSES, samples: int | None = None) -> None:
         N, d = reduced.Z.shape
         self._reduced, self._groups, self._trace_P = reduced, groups, trace_P
         self._F = F / reduced.scale
-        M = np.linalg.inv(reduced.S + _RHO * np.eye(N))
-        self._gain = _RHO * M
-        count = int(np.clip(_WORK / (N * N * _PASSES), *_SAMPLES))
+        self._rho, self._passes = rho, passes
+        M = np.linalg.inv(reduced.S + rho * np.eye(N))
+        self._gain = rho * M
+        count = samples or int(np.clip(_WORK / (N * N * passes), *_SAMPLES))
         self._z = np.random.default_rng(_SEED).standard_normal((d, count))
         self._offset = M @ (reduced.Z @ self._z)
 
@@ -62,9 +67,9 @@ class BenignLoss:
 
     def _penalised(self, gamma: float) -> Array:
         """nu(z; gamma) [N x samples], scaled."""
-        limit = thresholds(self._reduced, self._groups, gamma)[:, None] / _RHO
+        limit = thresholds(self._reduced, self._groups, gamma)[:, None] / self._rho
         t, u = np.zeros_like(self._offset), np.zeros_like(self._offset)
-        for _ in range(_PASSES):
+        for _ in range(self._passes):
             nu = self._offset + self._gain @ (t - u)
             v = ALPHA * nu + (1.0 - ALPHA) * t + u
             keep = np.maximum(0.0, 1.0 - limit / np.maximum(self._groups.norms(v), _TINY))
