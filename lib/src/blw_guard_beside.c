@@ -44,6 +44,27 @@ static void solve_secular(size_t r, blw_real_t k, blw_real_t gamma, const blw_re
     }
 }
 
+/* V nu_i and g of (10). */
+static void turn(blw_guard_t *self, size_t i, const blw_real_t *V, const blw_real_t *s,
+                 blw_real_t *before, blw_real_t *g)
+{
+    const size_t r = self->model->r;
+
+    blw_la_fill(r, BLW_R(0.0), before);
+    blw_la_fill(r, BLW_R(0.0), g);
+    guard_mul(r, r, 0U, r, V, &self->l[i * r], g);
+    if (!guard_has(self->attacked, i)) {
+        return;
+    }
+    for (size_t a = 0U; a < r; a++) {
+        self->step[a] = self->e[(i * r) + a] - self->eta[(i * r) + a];
+    }
+    guard_mul(r, r, 0U, r, V, self->step, before);
+    for (size_t c = 0U; c < r; c++) {
+        g[c] += s[c] * before[c];
+    }
+}
+
 void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j)
 {
     const blw_guard_model_t *const model = self->model;
@@ -55,17 +76,8 @@ void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j)
     blw_real_t *const g      = &self->turned[r];
     blw_real_t *const after  = &self->turned[2U * r];
 
-    blw_la_fill(3U * r, BLW_R(0.0), self->turned);
-    guard_mul(r, r, 0U, r, V, &self->l[i * r], g);
-    if (guard_has(self->attacked, i)) {
-        for (size_t a = 0U; a < r; a++) {
-            self->step[a] = self->e[(i * r) + a] - self->eta[(i * r) + a];
-        }
-        guard_mul(r, r, 0U, r, V, self->step, before);
-        for (size_t c = 0U; c < r; c++) {
-            g[c] += s[c] * before[c];
-        }
-    }
+    turn(self, i, V, s, before, g);
+    blw_la_fill(r, BLW_R(0.0), after);
     const blw_real_t gamma = blw_la_norm(r, g);
     self->attacked &= ~guard_bit(i);
     if (gamma > model->k) {

@@ -13,6 +13,9 @@
 /** Rows of a strip. */
 #define GUARD_STRIP 3U
 
+/** Rows of two strips. */
+#define GUARD_TWO 6U
+
 static inline void guard_mul_strip(size_t width, size_t count, const blw_real_t *M,
                                    const blw_real_t *x, blw_real_t *y)
 {
@@ -32,7 +35,7 @@ static inline void guard_mul_strip(size_t width, size_t count, const blw_real_t 
 static inline void guard_mul_two(size_t count, const blw_real_t *M, const blw_real_t *below,
                                  const blw_real_t *x, blw_real_t *y)
 {
-    blw_real_t sum[2U * GUARD_STRIP] = {BLW_R(0.0)};
+    blw_real_t sum[GUARD_TWO] = {BLW_R(0.0)};
 
     for (size_t c = 0U; c < count; c++) {
         for (size_t a = 0U; a < GUARD_STRIP; a++) {
@@ -42,7 +45,7 @@ static inline void guard_mul_two(size_t count, const blw_real_t *M, const blw_re
         M += GUARD_STRIP;
         below += GUARD_STRIP;
     }
-    for (size_t a = 0U; a < (2U * GUARD_STRIP); a++) {
+    for (size_t a = 0U; a < GUARD_TWO; a++) {
         y[a] += sum[a];
     }
 }
@@ -68,9 +71,9 @@ static inline void guard_mul_t_strip(size_t width, size_t count, const blw_real_
 static inline void guard_mul_t_two(size_t count, const blw_real_t *M, const blw_real_t *below,
                                    const blw_real_t *x, const blw_real_t *from, blw_real_t *to)
 {
-    blw_real_t x_rows[2U * GUARD_STRIP];
+    blw_real_t x_rows[GUARD_TWO];
 
-    for (size_t a = 0U; a < (2U * GUARD_STRIP); a++) {
+    for (size_t a = 0U; a < GUARD_TWO; a++) {
         x_rows[a] = x[a];
     }
     for (size_t c = 0U; c < count; c++) {
@@ -115,10 +118,10 @@ static inline void guard_both_two(size_t count, const blw_real_t *M, const blw_r
                                   const blw_real_t *x_rows, const blw_real_t *x_cols,
                                   blw_real_t *y_rows, blw_real_t *y_cols)
 {
-    blw_real_t x[2U * GUARD_STRIP];
-    blw_real_t sum[2U * GUARD_STRIP] = {BLW_R(0.0)};
+    blw_real_t x[GUARD_TWO];
+    blw_real_t sum[GUARD_TWO] = {BLW_R(0.0)};
 
-    for (size_t a = 0U; a < (2U * GUARD_STRIP); a++) {
+    for (size_t a = 0U; a < GUARD_TWO; a++) {
         x[a] = x_rows[a];
     }
     for (size_t c = 0U; c < count; c++) {
@@ -137,7 +140,7 @@ static inline void guard_both_two(size_t count, const blw_real_t *M, const blw_r
         M += GUARD_STRIP;
         below += GUARD_STRIP;
     }
-    for (size_t a = 0U; a < (2U * GUARD_STRIP); a++) {
+    for (size_t a = 0U; a < GUARD_TWO; a++) {
         y_rows[a] += sum[a];
     }
 }
@@ -149,7 +152,7 @@ static inline void guard_mul(size_t rows, size_t cols, size_t first, size_t coun
     const size_t skip = first * GUARD_STRIP;
     size_t       a    = 0U;
 
-    for (; (a + 6U) <= rows; a += 6U) {
+    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
         guard_mul_two(count, &M[(a * cols) + skip], &M[((a + 3U) * cols) + skip], x, &y[a]);
     }
     if ((a + 3U) <= rows) {
@@ -174,7 +177,7 @@ static inline void guard_mul_t(size_t rows, size_t cols, size_t first, size_t co
     const blw_real_t *start = from;
     size_t            a     = 0U;
 
-    for (; (a + 6U) <= rows; a += 6U) {
+    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
         guard_mul_t_two(count, &M[(a * cols) + skip], &M[((a + 3U) * cols) + skip], &x[a], start,
                         to);
         start = to;
@@ -200,7 +203,7 @@ static inline void guard_both(size_t rows, size_t cols, const blw_real_t *M,
 {
     size_t a = 0U;
 
-    for (; (a + 6U) <= rows; a += 6U) {
+    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
         guard_both_two(cols, &M[a * cols], &M[(a + 3U) * cols], &x_rows[a], x_cols, &y_rows[a],
                        y_cols);
     }

@@ -197,6 +197,36 @@ static inline void random_seal(guard_random_t *made)
     made->model.head.crc = check.crc;
 }
 
+/** Everything of the model that does not depend on its size. */
+static inline void random_bind(guard_random_t *made, size_t r, size_t p)
+{
+    made->model = (blw_guard_model_t){
+        .head  = {.abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_GUARD, .plant = &made->plant},
+        .r     = (uint8_t)r,
+        .reach = (uint8_t)r,
+        .n_u   = 1U,
+        .n_units = made->plant.m,
+        .most    = (uint8_t)RANDOM_MOST,
+        .pairs   = (p == 1U) ? 1U : 0U,
+        .unit    = made->unit,
+        .rank    = made->rank,
+        .Lam     = made->Lam,
+        .b       = made->b,
+        .S       = made->strips,
+        .V       = made->V,
+        .s       = made->s,
+        .Fu      = made->zeros,
+        .Gu      = made->zeros,
+        .effect  = made->ones,
+        .drift   = made->ones,
+        .k       = BLW_R(2.0),
+        .exclude = BLW_R(3.0),
+        .gain    = BLW_R(0.125),
+        .kappa   = BLW_R(1.0),
+        .omega   = BLW_R(1.0)};
+    made->model.max_updates = 200U;
+}
+
 /** m sensors with r states each, of which p may be excluded; d = rank of S, at least r. */
 static inline void random_make(guard_random_t *made, size_t m, size_t r, size_t d, size_t p)
 {
@@ -230,31 +260,7 @@ static inline void random_make(guard_random_t *made, size_t m, size_t r, size_t 
                                 .y_min  = made->low,
                                 .y_max  = made->high,
                                 .x0     = made->zeros};
-    made->model = (blw_guard_model_t){
-        .head  = {.abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_GUARD, .plant = &made->plant},
-        .r     = (uint8_t)r,
-        .reach = (uint8_t)r,
-        .n_u   = 1U,
-        .n_units = (uint8_t)m,
-        .most    = (uint8_t)RANDOM_MOST,
-        .pairs   = (p == 1U) ? 1U : 0U,
-        .unit    = made->unit,
-        .rank    = made->rank,
-        .Lam     = made->Lam,
-        .b       = made->b,
-        .S       = made->strips,
-        .V       = made->V,
-        .s       = made->s,
-        .Fu      = made->zeros,
-        .Gu      = made->zeros,
-        .effect  = made->ones,
-        .drift   = made->ones,
-        .k       = BLW_R(2.0),
-        .exclude = BLW_R(3.0),
-        .gain    = BLW_R(0.125),
-        .kappa   = BLW_R(1.0),
-        .omega   = BLW_R(1.0)};
-    made->model.max_updates = 200U;
+    random_bind(made, r, p);
     random_seal(made);
 }
 
