@@ -22,11 +22,12 @@ static bool read_byte(const char *hex, uint8_t *byte)
 /* "#2A36": classic; "##12A36": FD with its flags. */
 static bool read_data(const char *text, blw_frame_t *frame)
 {
-    const bool   fd    = text[1] == '#';
-    const char  *hex   = fd ? &text[3] : &text[1];
-    const size_t bytes = (fd && (text[2] == '\0')) ? 0U : (strlen(hex) / 2U);
+    const bool   fd     = text[1] == '#';
+    const char  *hex    = (fd && (text[2] != '\0')) ? &text[3] : &text[1];
+    const size_t digits = strlen(hex);
+    const size_t bytes  = digits / 2U;
 
-    if ((bytes > BLW_FRAME_MAX) || (!fd && (bytes > BLW_FRAME_CLASSIC_MAX))) {
+    if (((digits % 2U) != 0U) || (bytes > (fd ? BLW_FRAME_MAX : BLW_FRAME_CLASSIC_MAX))) {
         return false;
     }
     frame->len = (uint8_t)bytes;
