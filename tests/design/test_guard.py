@@ -140,6 +140,29 @@ def test_library_given_a_fake_state_shift_on_liu5_stays_near(libraries, attacked
     assert mean_square(found, x) / np.trace(gains.P) < 3.0
 
 
+SHAPES = {
+    "constant": lambda k: np.ones(len(k)),
+    "alternating": lambda k: (-1.0) ** k,
+    "unstable mode": lambda k: (-2.0) ** (k % 5) / 4.0,
+}
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_library_given_the_worst_magnitude_on_liu5_stays_bounded(libraries, shape):
+    """Below the threshold nothing is removed, far above it everything: the worst is between."""
+    plant, gains, feedback = liu5()
+    designed = guard.design(plant, gains, guard.Options())
+    y, u, x = simulate(plant, 700, 5, np.array(feedback))
+    ratios = []
+    for attacked in range(plant.m):
+        for size in (2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 12.0):
+            false = y.copy()
+            false[50:, attacked] += size * SHAPES[shape](np.arange(650))
+            found = GuardLibrary(libraries["f32"], plant, gains, designed).run(false, u)
+            ratios.append(mean_square(found, x) / np.trace(gains.P))
+    assert 2.0 < max(ratios) < 15.0
+
+
 @pytest.mark.parametrize("attacked", [0, 1, 2, 3])
 def test_library_given_gross_attacks_on_the_pendulum_estimates_as_without_the_sensor(
     libraries, attacked
