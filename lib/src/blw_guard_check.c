@@ -9,7 +9,7 @@ static bool sizes_ok(const blw_guard_model_t *model)
     return (model->r >= 1U) && (model->reach >= 1U) && (model->reach <= model->r)
            && (model->n_u <= plant->n) && (model->n_units <= plant->m)
            && (model->n_units > plant->p) && (model->most >= 1U) && (model->most <= plant->m)
-           && (model->search <= 1U) && (model->max_updates >= 1U) && (model->pairs <= 1U);
+           && (model->search <= 2U) && (model->max_updates >= 1U) && (model->pairs <= 1U);
 }
 
 /* Pairs are for single sensors only. */

@@ -33,8 +33,9 @@ blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *se
 /** The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
  *  `margin` would not change the choice. */
 blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear);
-/** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors. */
-blw_mask_t blw_guard_search(blw_guard_t *self);
+/** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors; or a
+ *  set that is `known` to explain all that clips, unless another explains k^2 more. */
+blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known);
 /** Copy S_II, I = set of at most model->most sensors, to self->L.  @return its rows. */
 size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set);
 /** Factor the first rows of self->L in place.  Directions that nothing outside the set can check

@@ -264,7 +264,7 @@ static blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
     return blw_guard_reduce(self, rows, self->step);
 }
 
-blw_mask_t blw_guard_search(blw_guard_t *self)
+blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known)
 {
     const blw_guard_model_t *const model = self->model;
     const blw_mask_t               all   = BLW_MASK_ALL(model->n_units);
@@ -272,6 +272,10 @@ blw_mask_t blw_guard_search(blw_guard_t *self)
     blw_mask_t                     best  = sensors_of(model, units);
     blw_real_t                     most  = BLW_R(-1.0);
 
+    if (known != 0U) {
+        most = explained_by(self, known) + (model->k * model->k);
+        best = known;
+    }
     while ((units != 0U) && (units <= all)) {
         const blw_mask_t set       = sensors_of(model, units);
         const blw_real_t explained = explained_by(self, set);

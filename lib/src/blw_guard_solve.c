@@ -359,12 +359,14 @@ blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
         *converged = descend_without(self, set, search ? (most / 2U) : most, &descent);
     }
     const bool unexplained = (self->attacked & ~self->excluded) != 0U;
-    if ((set != 0U) && unexplained && search) {
+    if ((set != 0U) && ((unexplained && search) || (model->search > 1U))) {
+        const blw_mask_t known = unexplained ? 0U : set;
+
         blw_la_copy(N, self->e, self->eta);
         blw_guard_multipliers(model, self->eta, self->l);
         self->attacked = 0U;
         self->excluded = 0U;
-        *converged     = descend_without(self, blw_guard_search(self), most, &descent);
+        *converged     = descend_without(self, blw_guard_search(self, known), most, &descent);
     }
     return *converged ? descent.pending : blw_guard_bound(self);
 }

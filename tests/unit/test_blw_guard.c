@@ -165,6 +165,20 @@ static void test_step_given_search_takes_the_set_that_explains_most(void)
     TEST_ASSERT_TRUE(out.iterations <= made.model.max_updates);
 }
 
+static void test_step_given_search_at_every_exclusion_keeps_a_choice_that_explains_all(void)
+{
+    blw_real_t first = BLW_R(0.0);
+
+    step(gross, 7U);
+    first             = out.x_hat[0];
+    made.model.search = 2U;
+    start();
+    step(gross, 7U);
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    TEST_ASSERT_REAL_WITHIN(4.0 * SUPPORT_TOL, first, out.x_hat[0]);
+    TEST_ASSERT_TRUE(out.iterations <= made.model.max_updates);
+}
+
 static void test_step_during_warm_up_excludes_nobody(void)
 {
     made.model.warm_up = 2U;
@@ -329,6 +343,7 @@ int main(void)
     RUN_TEST(test_step_given_no_kappa_reports_the_largest_number);
     RUN_TEST(test_step_given_units_excludes_all_sensors_of_one);
     RUN_TEST(test_step_given_search_takes_the_set_that_explains_most);
+    RUN_TEST(test_step_given_search_at_every_exclusion_keeps_a_choice_that_explains_all);
     RUN_TEST(test_step_during_warm_up_excludes_nobody);
     RUN_TEST(test_step_given_a_slow_bias_raises_suspicion_only);
     RUN_TEST(test_step_given_kernels_uses_them_for_the_same_result);

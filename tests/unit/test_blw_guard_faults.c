@@ -65,7 +65,7 @@ static void test_init_given_sizes_out_of_limits_refuses(void)
     assert_refused();
     made.model.most = 4U;
     assert_refused();
-    made.model.search = 2U;
+    made.model.search = 3U;
     assert_refused();
     made.model.max_updates = 0U;
     assert_refused();

@@ -53,6 +53,9 @@ RARE_CLIPPING = 0.95
 #: Sensors beside the p excluded units that a Newton step has room for.
 NEWTON_RESERVE = 3
 
+#: blw_guard_model_t.search where noise that is not white may hide who lies from the first choice.
+SEARCH_ALWAYS = 2
+
 #: Sets of units times multiply-adds for each that a search may cost in a step.
 SEARCH_LIMIT = 2_000_000
 
@@ -149,7 +152,8 @@ def struct(
         "n_u": bank.split.n_u,
         "n_units": len(model.units),
         "most": newton_sensors(model),
-        "search": int(limits.search),
+        "search": SEARCH_ALWAYS if limits.search and model.noise_margin > 0.0
+                  else int(limits.search),
         "pairs": int(pairs),
         "max_updates": limits.max_updates,
         "warm_up": limits.warm_up,

@@ -18,7 +18,8 @@
  *  get k_i = 0 and (2) is solved on from there: their samples then have no influence at all.  As
  *  soon as it is beyond doubt which units these will be, the first descent ends.  If that leaves
  *  another sensor with nu_i /= 0, and the model asks for it, all sets I of p units are searched for
- *  the one whose removal explains most, l_I' S_II^-1 l_I.
+ *  the one whose removal explains most, l_I' S_II^-1 l_I.  (Or whenever a unit is excluded, and
+ *  then the first choice stands unless another set explains k^2 more.)
  *
  *  A missing sample is replaced by its prediction from the last estimate.  docs/guard.md derives
  *  all of this; tools/blw/guard.py makes the tables.
@@ -64,7 +65,8 @@ typedef struct blw_guard_model {
     uint8_t           n_units;     /**< units, p < n_units <= m */
     uint8_t           most;        /**< sensors that may move in one Newton step, those of
                                         the p largest units at least, >= 1 */
-    uint8_t           search;      /**< 1: search the sets of p units when exclusion fails */
+    uint8_t           search;      /**< 1: search the sets of p units when exclusion fails, 2: and
+                                        whenever a unit is excluded */
     uint8_t           pairs;       /**< 1: V and s are there; needs p = 1 and n_units = m */
     uint16_t          max_updates; /**< bound on block updates in one step, >= 1; joint steps count
                                         as several (blw_guard_solve.c) */
