@@ -34,7 +34,7 @@ blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *se
  *  `margin` would not change the choice. */
 blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear);
 /** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors; or a
- *  set that is `known` to explain all that clips, unless another explains k^2 more. */
+ *  set that is `known` to explain all that clips, unless another explains k^2 / 4 more. */
 blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known);
 /** Copy S_II, I = set of at most model->most sensors, to self->L.  @return its rows. */
 size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set);

@@ -273,7 +273,7 @@ blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known)
     blw_real_t                     most  = BLW_R(-1.0);
 
     if (known != 0U) {
-        most = explained_by(self, known) + (model->k * model->k);
+        most = explained_by(self, known) + (BLW_R(0.25) * model->k * model->k);
         best = known;
     }
     while ((units != 0U) && (units <= all)) {

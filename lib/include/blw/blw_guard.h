@@ -19,7 +19,7 @@
  *  soon as it is beyond doubt which units these will be, the first descent ends.  If that leaves
  *  another sensor with nu_i /= 0, and the model asks for it, all sets I of p units are searched for
  *  the one whose removal explains most, l_I' S_II^-1 l_I.  (Or whenever a unit is excluded, and
- *  then the first choice stands unless another set explains k^2 more.)
+ *  then the first choice stands unless another set explains k^2 / 4 more.)
  *
  *  A missing sample is replaced by its prediction from the last estimate.  docs/guard.md derives
  *  all of this; tools/blw/guard.py makes the tables.
