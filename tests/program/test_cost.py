@@ -6,6 +6,8 @@ import shutil
 
 import pytest
 
+from blw.cost import document
+
 KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
         "instructions_worst", "flash_bytes", "ram_bytes", "stack_bytes"}
 
@@ -51,6 +53,15 @@ def test_size_given_a_method_that_refuses_lists_the_reason(bulwark):
     (refusal,) = printed["refused"]
     assert (refusal["model"], refusal["method"]) == ("liu5", "canonical")
     assert "derogatory" in refusal["reason"]
+
+
+def test_bench_given_the_first_model_agrees_with_the_document(bulwark, root):
+    """The whole table takes minutes; CI writes all of it again."""
+    done = bulwark("bench", "--target", "m4f", "--model", "liu5", "--json")
+    assert done.returncode == 0, done.stderr
+    printed = (root / "docs" / "cost.md").read_text().split("## Cortex-M4F")[1].split("##")[0]
+    shown = [line for line in printed.splitlines() if line.startswith("| liu5")]
+    assert shown == [document.line(row) for row in json.loads(done.stdout)["rows"]]
 
 
 @pytest.mark.parametrize("option, value, hint", [

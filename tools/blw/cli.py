@@ -28,6 +28,7 @@ COMMANDS = {
     "joint": "blw.joint_command:joint_group",
     "bench": "blw.cost.command:bench",
     "size": "blw.cost.command:size",
+    "amalgamate": "blw.amalgamate:amalgamate",
     "doctor": "blw.doctor:doctor",
     "test": "blw.testing:test",
 }

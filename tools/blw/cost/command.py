@@ -2,12 +2,14 @@
 """`bulwark bench` and `bulwark size`: what every method costs on a microcontroller."""
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import click
 from tqdm import tqdm
 
-from blw.cost import cases, measure, targets
+from blw.atomic import write_files
+from blw.cost import cases, document, measure, targets
 from blw.design import json_text
 from blw.errors import BulwarkError
 from blw.methods import REGISTRY
@@ -37,15 +39,20 @@ def _shared_options(command: Callable[..., None]) -> Callable[..., None]:
 
 @click.command(short_help="Instructions, flash, RAM and stack per method.")
 @_shared_options
-def bench(as_json: bool, **names: Names) -> None:
+@click.option("--write", "path", type=click.Path(path_type=Path, dir_okay=False),
+              help="Also write the figures into this file, as docs/cost.md has them.")
+def bench(as_json: bool, path: Path | None, **names: Names) -> None:
     """Measure executed instructions per step, flash, RAM and worst-case stack of every method.
 
     Typical is the median of 50 steps without attack, attacked the mean of 200 attacked steps, worst
     the most of all steps.  The programs run in QEMU, which counts exactly.
     """
     plan = _plan(**names)
-    rows = tqdm(measure.measure(plan), "measuring", len(plan.programs), leave=False, disable=None)
-    _print(list(rows), plan, WORK | SIZES, as_json)
+    rows = list(tqdm(measure.measure(plan), "measuring", len(plan.programs), leave=False,
+                     disable=None))
+    if path:
+        write_files(path.parent, {path.name: document.text(rows, plan.refused)})
+    _print(rows, plan, WORK | SIZES, as_json)
 
 
 @click.command(short_help="Flash, RAM and stack per method.")

@@ -2,17 +2,21 @@
 """Worst-case stack of one estimator: the deepest path through the call graph that gcc leaves.
 
 Routines of the compiler's library have no such graph; theirs is read off the disassembly, where the
-sum over all of a routine's pushes is an upper bound.  Recursion, a frame of unknown size and a call
-through a pointer are errors, not guesses.
+sum over all of a routine's pushes is an upper bound.  A call through a pointer may go to any
+function of the model that the linker kept: its straight-line kernels.  Recursion and a frame of
+unknown size are errors, not guesses.
 """
 
 import re
 import subprocess
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from blw.build import BUILD, StepFailed
 from blw.cost.programs import Program
 
+#: How gcc names what a pointer points to.
+_POINTER = "__indirect_call"
 _NODE = re.compile(r'^node: \{ title: "([^"]+)" label: "([^"]*)"', re.MULTILINE)
 _EDGE = re.compile(r'^edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', re.MULTILINE)
 _FRAME = re.compile(r"(\d+) bytes \((static|dynamic,bounded)\)")
@@ -41,22 +45,31 @@ class CallGraph:
 
 def stack_bytes(program: Program, owner: str) -> int:
     """The most that init, reset and step of the module `owner` need."""
-    graph = _of_compiler(program)
-    _add_library(graph, _said(program, "objdump", "-d"), _said(program, "nm"))
+    symbols = _said(program, "nm")
+    graph = CallGraph()
+    replays = BUILD / program.preset / "port" / "replay" / "CMakeFiles"
+    kernels = _add_compiled(graph, replays / f"blw_model_{program.model}.dir")
+    _add_compiled(graph, BUILD / program.preset / "lib" / "CMakeFiles" / "blw.dir")
+    linked = {line.split()[-1] for line in symbols.splitlines()}
+    graph.frames[_POINTER] = 0
+    graph.calls[_POINTER] = {name for name in kernels if name.rpartition(":")[2] in linked}
+    _add_library(graph, _said(program, "objdump", "-d"), symbols)
     return max(graph.deepest(f"blw_{owner}_{verb}") for verb in ("init", "reset", "step"))
 
 
-def _of_compiler(program: Program) -> CallGraph:
-    graph = CallGraph()
-    for path in (BUILD / program.preset).glob("lib/CMakeFiles/blw.dir/**/*.ci"):
+def _add_compiled(graph: CallGraph, folder: Path) -> set[str]:
+    """What gcc says about the sources of one CMake target; returns their functions."""
+    names: set[str] = set()
+    for path in folder.rglob("*.ci"):
         text = path.read_text(encoding="utf-8")
         for name, label in _NODE.findall(text):
             frame = _FRAME.search(label)
             if frame:
                 graph.frames[name] = int(frame[1])
+                names.add(name)
         for caller, callee in _EDGE.findall(text):
             graph.calls.setdefault(caller, set()).add(callee)
-    return graph
+    return names
 
 
 def _add_library(graph: CallGraph, listing: str, symbols: str) -> None:
