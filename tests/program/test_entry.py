@@ -84,7 +84,7 @@ def test_entry_given_command_and_help_explains_it(entry, command):
 
 
 @pytest.mark.parametrize("arguments, message", [
-    (("desing",), "unknown command 'desing'; there are: analyze bench demo"),
+    (("desing",), "unknown command 'desing'; there are: amalgamate analyze"),
     (("--verbose",), "unknown option '--verbose'; see tools/bulwark --help"),
     (("design",), "Missing argument 'MODEL'"),
     (("design", "no.toml", "--out", "out"), "no.toml: "),

@@ -40,8 +40,9 @@ def test_amalgamation_given_a_consumer_builds_and_runs(root, header, tmp_path, l
     library.write_text("#define BLW_IMPLEMENTATION\n#include <blw/blw_kalman.h>\n")
     include = ["-I", header.parents[1]]
     compiled(*COMPILERS["c"], *STRICT, *include, "-c", library, "-o", tmp_path / "library.o")
-    compiled(*COMPILERS[language], *STRICT, *include, root / "tests" / "install" / "consumer" / main,
-             tmp_path / "library.o", "-lm", "-o", tmp_path / "consumer")
+    consumer = root / "tests" / "install" / "consumer" / main
+    compiled(*COMPILERS[language], *STRICT, *include, consumer, tmp_path / "library.o", "-lm", "-o",
+             tmp_path / "consumer")
     assert subprocess.call([tmp_path / "consumer"]) == 0
 
 
@@ -65,7 +66,7 @@ def symbols(path):
 
 
 def test_source_list_given_a_plain_compiler_builds_firmware_without_python(root, tmp_path):
-    """The committed model, the library and the loop of port/firmware: a compiler is all it takes."""
+    """Committed model, library and the loop of port/firmware: a compiler is all it takes."""
     sources = source_list(root, tmp_path)
     assert {source.rsplit("/", 1)[1] for source in sources} == {
         path.name for path in (root / "lib" / "src").glob("*.c")}

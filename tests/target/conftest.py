@@ -1,28 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""What the tests on emulated targets share: cases, and a skip where a target cannot be had."""
-
-from functools import cache
+"""The emulated targets, one after the other."""
 
 import pytest
+from emulated import available
 
-from blw.cost import cases, targets
-
-
-@cache
-def prepared(name, steps):
-    """A case of the cost table with a log of so many steps."""
-    return cases.prepare(cases.CASES[name], steps)
+from blw.cost import targets
 
 
 @pytest.fixture(params=targets.TARGETS)
 def target(request):
     """Every target in turn."""
     return available(request.param)
-
-
-def available(name):
-    """The target with this name, or a skip if its compiler or its QEMU is not installed."""
-    one = targets.TARGETS[name]
-    if one.missing():
-        pytest.skip(f"not installed: {', '.join(one.missing())}")
-    return one

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import tomli_w
-from conftest import available
+from emulated import available
 
 from blw import pil, pil_drive
 from blw.build import BUILD, ROOT, build_programs, simulator
@@ -51,6 +51,18 @@ def test_node_given_attacked_frames_answers_all_with_the_bits_of_the_host(design
     assert (outcome.steps, outcome.sent, outcome.received) == (STEPS, 6 * STEPS, 4 * STEPS)
     assert outcome.sent + outcome.received >= 1_000
     assert json.loads((tmp_path / "pil.json").read_text())["steps"] == STEPS
+
+
+def test_run_given_the_transport_pil_runs_the_scenario_and_the_firmware(tmp_path):
+    available(pil.TARGET.name)
+    scenario = ROOT / "host_sim" / "scenarios" / "pendulum_cost.toml"
+    done = subprocess.run(
+        [sys.executable, "-m", "blw", "run", scenario, "--out", tmp_path, "--transport", "pil",
+         "--method", METHOD], env=os.environ | {"PYTHONPATH": str(ROOT / "tools")},
+        capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "300 steps, 1800 frames there and 1200 back, 0 answers lost, 0 differ" in done.stderr
+    assert (tmp_path / f"{METHOD}.csv").is_file()
 
 
 def test_check_given_other_outputs_than_the_firmware_s_finds_them(design, tmp_path):

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from conftest import available, prepared
+from emulated import available, prepared
 
 from blw.cost import programs
 from blw.cost.programs import Program

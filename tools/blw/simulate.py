@@ -143,7 +143,7 @@ def run_with_firmware(scenario: Path, out: Path, methods: Sequence[str], precisi
     named = [name for name in methods if name != EVERY_METHOD]
     if len(named) != 1 or precision != "f32" or options.get("runs"):
         raise BulwarkError(f"--transport {PIL} takes one --method, float, and one run")
-    status = run_scenario(scenario, out, named, precision, **options)
+    status = run_scenario(scenario, out, tuple(named), precision, **options)
     if status != 0:
         return status
     design = design_all(load(_read_scenario(scenario)[0]), named)
