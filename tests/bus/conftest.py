@@ -6,7 +6,9 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -40,7 +42,11 @@ class Recorded:
 
     transport: str
     out: Path
-    cases: dict[str, dict]
+    run: subprocess.CompletedProcess
+
+    def case(self, name: str) -> dict:
+        """What one case reported."""
+        return json.loads(self.run.stdout.splitlines()[-1])[name]
 
 
 @dataclass
@@ -80,17 +86,36 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
     return made
 
 
-@pytest.fixture(scope="session", params=("lcm", "can", "canfd"))
-def recorded(request: pytest.FixtureRequest, prepared: Prepared,
-             tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    transport = request.param
-    out = tmp_path_factory.mktemp(transport)
-    frames = os.environ.get("BULWARK_FRAMES", "10000")
-    within = ([HERE / "in_netns.sh"] if transport == "lcm"
-              else [HERE / "in_uml.sh", "-t", "800", "--"])
-    done = call([*within, "/usr/bin/env", "python3", HERE / "cases.py", bus("f32"), prepared.design,
-                 prepared.other, prepared.scenarios, out, transport, frames])
-    if done.returncode == NO_SUCH_BUS:
-        pytest.skip(done.stderr.strip())
-    assert done.returncode == 0, done.stdout + done.stderr
-    return Recorded(transport, out, json.loads(done.stdout.splitlines()[-1]))
+def on(*transports: str) -> pytest.MarkDecorator:
+    """Parametrise a test by transport; the tests of one transport share a worker and its record."""
+    return pytest.mark.parametrize(
+        "transport", [pytest.param(name, marks=pytest.mark.xdist_group(name))
+                      for name in transports])
+
+
+@pytest.fixture(scope="session")
+def record(prepared: Prepared,
+           tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Recorded]:
+    """The record of a transport, made when it is first asked for."""
+
+    @cache
+    def made(transport: str) -> Recorded:
+        out = tmp_path_factory.mktemp(transport)
+        frames = os.environ.get("BULWARK_FRAMES", "10000")
+        within = ([HERE / "in_netns.sh"] if transport == "lcm"
+                  else [HERE / "in_uml.sh", "-t", "800", "--"])
+        return Recorded(transport, out, call([
+            *within, "/usr/bin/env", "python3", HERE / "cases.py", bus("f32"), prepared.design,
+            prepared.other, prepared.scenarios, out, transport, frames]))
+
+    return made
+
+
+@pytest.fixture
+def recorded(record: Callable[[str], Recorded], transport: str) -> Recorded:
+    """The record of the test's transport; skips where the kernel has no such bus."""
+    found = record(transport)
+    if found.run.returncode == NO_SUCH_BUS:
+        pytest.skip(found.run.stderr.strip())
+    assert found.run.returncode == 0, found.run.stdout + found.run.stderr
+    return found

@@ -105,7 +105,7 @@ def _on_target(name: str) -> Tally:
 
 def _pytest(suite: str) -> Tally:
     command = [sys.executable, "-m", "pytest", "--quiet", "-rs", "-n", str(os.cpu_count()),
-               "--dist", "loadfile" if suite == "bus" else "load",  # a bus is set up once
+               "--dist", "loadgroup" if suite == "bus" else "load",  # a bus is set up once
                str(ROOT / "tests" / suite)]
     return _with_junit(command, BUILD / f"{suite}.xml", "--junitxml")
 
