@@ -45,10 +45,15 @@ void load_l1(TableReader tables, blw_l1_model_t &model)
     model.engine         = tables.integer<std::uint8_t>("engine");
     const std::size_t N  = model.N;
     model.first          = tables.indices("first", model.n_groups + std::size_t{1U});
-    model.Z              = tables.reals("Z", BLW_L1_Z_LEN(model.N, model.d));
+    model.Z              = tables.reals_or_null("Z", BLW_L1_Z_LEN(model.N, model.d));
     model.F              = tables.reals("F", model.n * N);
     model.c              = tables.reals("c", model.n_groups);
     model.M              = tables.reals_or_null("M", (N * (N + 1U)) / 2U);
+    model.S              = tables.reals_or_null("S", (N * (N + 1U)) / 2U);
+    model.W              = tables.reals_or_null("W", (N * (N + 1U)) / 2U);
+    model.G              = tables.reals_or_null("G", N * model.n);
+    const std::size_t n  = model.n;
+    model.P              = tables.reals_or_null("P", (n * (n + 1U)) / 2U);
     model.rho            = tables.real("rho");
     model.kappa_G        = tables.real("kappa_G");
     model.kappa_W        = tables.real("kappa_W");

@@ -51,6 +51,17 @@ void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *ou
     blw_la_trapv_t(m->N, m->d, m->Z, v, out);
 }
 
+/* l = S zeta, by the tables there are. */
+static void benign_multipliers(blw_l1_t *self, const blw_real_t *zeta)
+{
+    if (self->model->S != NULL) {
+        blw_la_symv(self->model->N, self->model->S, zeta, self->l);
+    } else {
+        blw_l1_project(self->model, zeta, self->z);
+        blw_l1_multipliers(self);
+    }
+}
+
 void blw_l1_multipliers(blw_l1_t *self)
 {
     blw_la_trapv(self->model->N, self->model->d, self->model->Z, self->z, self->l);
@@ -59,10 +70,12 @@ void blw_l1_multipliers(blw_l1_t *self)
 blw_real_t blw_l1_statistic(const blw_l1_t *self)
 {
     const blw_l1_model_t *const m   = self->model;
+    const bool                  one = !blw_l1_has_pairs(m); /* row g is group g */
     blw_real_t                  max = BLW_R(0.0);
 
     for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t ratio = blw_l1_norm(m, g, self->l) / m->c[g];
+        const blw_real_t norm  = one ? blw_la_abs(self->l[g]) : blw_l1_norm(m, g, self->l);
+        const blw_real_t ratio = norm / m->c[g];
         if (!(ratio <= BLW_REAL_MAX)) {
             return ratio; /* a NaN must not pass for 0 */
         }
@@ -100,11 +113,21 @@ size_t blw_l1_worst(const blw_l1_t *self, blw_real_t widen)
     return found;
 }
 
+/* |z| = |Z' tau|, where there is no Z from tau' S tau = tau' l. */
+static blw_real_t norm_of_z(const blw_l1_t *self)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    return (m->Z != NULL)
+               ? blw_la_norm(m->d, self->z)
+               : blw_la_sqrt(blw_la_max(blw_la_dot(m->N, self->tau, self->l), BLW_R(0.0)));
+}
+
 /* The gap (5) and the bound (6). */
 static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m   = self->model;
-    const blw_real_t            z   = blw_la_norm(m->d, self->z);
+    const blw_real_t            z   = norm_of_z(self);
     const blw_real_t            t   = BLW_R(1.0) / blw_la_max(BLW_R(1.0), blw_l1_statistic(self));
     blw_real_t                  sum = BLW_R(0.0); /* sum_g c_g |nu_g| */
     blw_real_t                  gap = BLW_R(0.5) * (BLW_R(1.0) - t) * (BLW_R(1.0) - t) * z * z;
@@ -170,7 +193,8 @@ void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
     self->z     = &self->step[N];
     self->dz    = &self->z[d];
     self->A     = &self->dz[d];
-    self->L     = &self->A[model->n_groups];
+    self->L     = (model->engine == (uint8_t)BLW_L1_TABLEAU) ? &self->step[N + model->n]
+                                                             : &self->A[model->n_groups];
     blw_l1_reset(self);
 }
 
@@ -188,8 +212,7 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     const blw_l1_model_t *const m = self->model;
 
     *info = (blw_l1_info_t){.kalman = false};
-    blw_l1_project(m, zeta, self->z);
-    blw_l1_multipliers(self);
+    benign_multipliers(self, zeta);
     info->statistic = blw_l1_statistic(self);
     if (info->statistic <= BLW_R(1.0)) {
         info->kalman    = true;
@@ -197,6 +220,8 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
         blw_l1_support_clear(self, zeta);
     } else if (!(info->statistic <= BLW_REAL_MAX)) {
         blw_l1_support_clear(self, zeta); /* a NaN: nothing can be said of it */
+    } else if (m->engine == (uint8_t)BLW_L1_TABLEAU) {
+        blw_l1_tableau(self, zeta, x_hat, info);
     } else if (m->engine == (uint8_t)BLW_L1_ADMM) {
         blw_l1_admm(self, zeta, info);
     } else {
@@ -207,7 +232,23 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     if (!info->converged) {
         report_gap(self, zeta, info);
     }
-    blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
+    if (info->kalman || (m->engine != (uint8_t)BLW_L1_TABLEAU)
+        || !(info->statistic <= BLW_REAL_MAX)) {
+        blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
+    }
+}
+
+/* blw_l1_excess() where row g is group g. */
+static blw_real_t excess_of_rows(const blw_l1_t *self, const blw_real_t *zeta, size_t first,
+                                 size_t count)
+{
+    blw_real_t max = BLW_R(0.0);
+
+    for (size_t i = first; i < (first + count); i++) {
+        const blw_real_t h = blw_la_abs(self->l[i]) + blw_la_abs(zeta[i] - self->tau[i]);
+        max                = blw_la_max(max, h / self->model->c[i]);
+    }
+    return max;
 }
 
 blw_real_t blw_l1_excess(const blw_l1_t *self, const blw_real_t *zeta, size_t first, size_t count)
@@ -215,6 +256,9 @@ blw_real_t blw_l1_excess(const blw_l1_t *self, const blw_real_t *zeta, size_t fi
     const blw_l1_model_t *const m   = self->model;
     blw_real_t                  max = BLW_R(0.0);
 
+    if (!blw_l1_has_pairs(m)) {
+        return excess_of_rows(self, zeta, first, count);
+    }
     for (size_t g = 0U; g < m->n_groups; g++) {
         if ((m->first[g] >= first) && (m->first[g] < (first + count))) {
             const blw_real_t h = blw_l1_norm(m, g, self->l) + blw_l1_nu_norm(self, zeta, g);
@@ -238,9 +282,12 @@ static bool groups_ok(const blw_l1_model_t *m)
 /* Thresholds and constants are positive; the engine has what it needs. */
 static bool numbers_ok(const blw_l1_model_t *m)
 {
-    const bool admm = (m->engine == (uint8_t)BLW_L1_ADMM);
-    bool       ok   = (m->kappa_G > BLW_R(0.0)) && (m->kappa_W > BLW_R(0.0))
-              && (admm ? (m->rho > BLW_R(0.0)) : (m->engine == (uint8_t)BLW_L1_ACTIVE_SET));
+    const bool admm    = (m->engine == (uint8_t)BLW_L1_ADMM);
+    const bool tableau = (m->engine == (uint8_t)BLW_L1_TABLEAU);
+    bool       ok =
+        (m->kappa_G > BLW_R(0.0)) && (m->kappa_W > BLW_R(0.0))
+        && (tableau ? !blw_l1_has_pairs(m)
+                    : (admm ? (m->rho > BLW_R(0.0)) : (m->engine == (uint8_t)BLW_L1_ACTIVE_SET)));
 
     for (size_t g = 0U; ok && (g < m->n_groups); g++) {
         ok = (m->c[g] > BLW_R(0.0));
@@ -257,10 +304,17 @@ blw_status_t blw_l1_check(const blw_l1_model_t *m, blw_table_check_t *check)
     const size_t N    = m->N;
     const bool   admm = (m->engine == (uint8_t)BLW_L1_ADMM);
 
-    blw_table_add(check, m->Z, BLW_L1_Z_LEN(N, m->d));
+    const bool   tableau = (m->engine == (uint8_t)BLW_L1_TABLEAU);
+    const size_t packed  = (N * (N + 1U)) / 2U;
+
+    blw_table_add(check, m->Z, tableau ? 0U : BLW_L1_Z_LEN(N, m->d));
     blw_table_add(check, m->F, (size_t)m->n * N);
     blw_table_add(check, m->c, m->n_groups);
-    blw_table_add(check, m->M, admm ? ((N * (N + 1U)) / 2U) : 0U);
+    blw_table_add(check, m->M, admm ? packed : 0U);
+    blw_table_add(check, m->S, tableau ? packed : 0U);
+    blw_table_add(check, m->W, tableau ? packed : 0U);
+    blw_table_add(check, m->G, tableau ? (N * m->n) : 0U);
+    blw_table_add(check, m->P, tableau ? blw_la_packed_row(m->n) : 0U);
     blw_table_add_real(check, m->rho);
     blw_table_add_real(check, m->kappa_G);
     blw_table_add_real(check, m->kappa_W);

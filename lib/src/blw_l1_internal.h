@@ -71,6 +71,30 @@ blw_real_t blw_l1_support_effect(const blw_l1_t *self);
 /* max over A of |l_g - c_g dir_g| / (c_g + |z|). */
 blw_real_t blw_l1_support_residual(const blw_l1_t *self);
 
+/* Whether nu_i /= 0 in an engine that keeps the sign of nu in dir, 0 elsewhere. */
+static inline bool blw_l1_clipped(const blw_l1_t *self, size_t i)
+{
+    return blw_la_abs(self->dir[i]) > BLW_R(0.5);
+}
+
+/* What rounding may leave of |l_i| <= c_i. */
+static inline blw_real_t blw_l1_slack(blw_real_t c_i)
+{
+    return (BLW_R(16.0) * BLW_REAL_EPS) + ((BLW_R(16.0) * BLW_REAL_EPS) * c_i);
+}
+
+/* Whether the sizes of l outside A and the signs of nu = zeta - tau on A are those of a minimum. */
+bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta);
+
+/* h = -G' l, [n]: 0 at a minimum. */
+void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h);
+
+/* Solve the optimality conditions for the rows in dir and l on them: l on the others, nu in tau and
+ * x [n].  *bound = |last correction of x|.  @return whether they make a minimum. */
+bool blw_l1_kkt(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound);
+
+/* Starts from l = S zeta; writes x [n]. */
+void blw_l1_tableau(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info);
 /* Engines: start from A, dir and tau, leave the best tau found. */
 void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);
 void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);

@@ -23,7 +23,19 @@ bool blw_la_bounded(size_t n, const blw_real_t *x)
 
 void blw_la_copy(size_t n, const blw_real_t *x, blw_real_t *y)
 {
-    for (size_t i = 0U; i < n; i++) {
+    size_t i = 0U;
+
+    for (; (i + 4U) <= n; i += 4U) {
+        const blw_real_t a = x[i];
+        const blw_real_t b = x[i + 1U];
+        const blw_real_t c = x[i + 2U];
+        const blw_real_t d = x[i + 3U];
+        y[i]               = a;
+        y[i + 1U]          = b;
+        y[i + 2U]          = c;
+        y[i + 3U]          = d;
+    }
+    for (; i < n; i++) {
         y[i] = x[i];
     }
 }
@@ -99,7 +111,16 @@ void blw_la_gemv(size_t rows, size_t cols, const blw_real_t *A, const blw_real_t
 void blw_la_gemv_add(size_t rows, size_t cols, const blw_real_t *A, const blw_real_t *x,
                      blw_real_t *y)
 {
-    for (size_t i = 0U; i < rows; i++) {
+    size_t i = 0U;
+
+    for (; (i + 3U) <= rows; i += 3U) {
+        blw_real_t sum[3];
+        three_dots(cols, &A[i * cols], x, sum);
+        y[i] += sum[0];
+        y[i + 1U] += sum[1];
+        y[i + 2U] += sum[2];
+    }
+    for (; i < rows; i++) {
         y[i] += blw_la_dot(cols, &A[i * cols], x);
     }
 }

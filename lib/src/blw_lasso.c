@@ -112,7 +112,7 @@ static bool transform_sensor(blw_lasso_t *self, size_t i)
     if (self->model->P != NULL) {
         blw_la_gemv(r, r, &self->model->P[i * r * r], zeta_i, xi_i);
     }
-    return blw_la_bounded(r, zeta_i) && blw_la_bounded(r, xi_i);
+    return blw_la_bounded(r, zeta_i) && ((xi_i == zeta_i) || blw_la_bounded(r, xi_i));
 }
 
 /* xi of all sensors.  A filter that a sample throws out of bounds starts again from the prediction,
@@ -149,11 +149,9 @@ static bool move_reference(blw_lasso_t *self)
         return false;
     }
     for (size_t j = 0U; j < n; j++) {
-        self->d[j] = self->x_hat[j] - self->x_bar[j]; /* what rounding has left of d */
+        self->d[j] = self->x_bar[j] - self->x_hat[j]; /* what rounding has left of -d */
     }
-    for (size_t i = 0U; i < self->model->l1->N; i++) {
-        self->zeta[i] -= blw_la_dot(n, &jordan->G[i * n], self->d);
-    }
+    blw_la_gemv_add(self->model->l1->N, n, jordan->G, self->d, self->zeta);
     return true;
 }
 

@@ -69,12 +69,33 @@ def test_design_given_golden_system_runs_as_the_kalman_filter(name):
         assert np.abs(F @ zeta - x_hat).max() < 1e-9 * max(1.0, np.abs(x_hat).max())
 
 
-@pytest.mark.parametrize("name", GOLDEN)
-def test_design_given_golden_system_packs_a_Z_that_cancels_x(name):
-    _, plant, _, designed = design(name, gamma=1.0)
+def test_design_given_pairs_packs_a_Z_that_cancels_x():
+    _, plant, _, designed = design("complex", gamma=1.0)
     tables = designed.tables.to_json()
     G = matrix(tables["jordan"]["G"], plant.n)
     assert np.abs(trapezoid(tables["l1"]).T @ G).max() < 1e-12 * np.abs(G).max()
+
+
+def symmetric(packed, size):
+    S = np.zeros((size, size))
+    S[np.tril_indices(size)] = packed
+    return S + np.tril(S, -1).T
+
+
+@pytest.mark.parametrize("name", ["paper0", "jordanA", "paper1"])
+def test_design_given_real_modes_packs_the_identities_of_the_tableau(name):
+    _, plant, _, designed = design(name, gamma=1.0)
+    tables = designed.tables.to_json()
+    fused, N = tables["l1"], tables["l1"]["N"]
+    if fused["engine"] != l1.ENGINE_TABLEAU:
+        assert fused["n_groups"] < N
+        return
+    S, W = symmetric(fused["S"], N), symmetric(fused["W"], N)
+    G, F = matrix(fused["G"], plant.n), matrix(fused["F"], N)
+    assert np.abs(S @ G).max() < 1e-11 * np.abs(S).max() * np.abs(G).max()
+    assert np.abs(W @ S + G @ F - np.eye(N)).max() < 1e-7
+    assert np.abs(F @ W - symmetric(fused["P"], plant.n) @ G.T).max() < 1e-9 * np.abs(G).max()
+    assert fused["Z"] is None
 
 
 def test_design_given_nine_tenths_recovered_chooses_the_gamma_of_the_specification():
@@ -114,11 +135,12 @@ def test_design_given_W_too_ill_conditioned_for_a_small_gamma_says_so():
     assert designed.info["benign_loss"] is None
 
 
-@pytest.mark.parametrize("name, bound", [("paper0", 4 * 15), ("complex", 8 * 15)])
-def test_design_given_auto_takes_the_active_set_with_its_bound(name, bound):
+@pytest.mark.parametrize("name, engine, bound", [("paper0", l1.ENGINE_TABLEAU, 4 * 15),
+                                                 ("complex", l1.ENGINE_ACTIVE_SET, 8 * 15)])
+def test_design_given_auto_takes_the_active_set_with_its_bound(name, engine, bound):
     *_, designed = design(name, gamma=1.0)
     fused = designed.tables.to_json()["l1"]
-    assert fused["engine"] == l1.ENGINE_ACTIVE_SET
+    assert fused["engine"] == engine
     assert fused["max_iterations"] == designed.info["max_iterations"] == bound
     assert fused["M"] is None and fused["rho"] == 0.0
 

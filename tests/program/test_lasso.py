@@ -31,8 +31,7 @@ def test_mse_on_the_papers_example_is_as_published(tmp_path: Path, gamma: float)
     benign, attacked = TABLE[gamma]
     assert mse["before"] / TRACE_P == pytest.approx(benign, abs=0.02)
     assert mse["during"] / TRACE_P == pytest.approx(attacked, rel=0.05)
-    # float32 may leave a degenerate minimum unverified, and then says so
-    assert summary["methods"]["lasso"]["outcomes"]["bound"] <= STEPS // 1000
+    assert summary["methods"]["lasso"]["outcomes"]["bound"] == 0
 
 
 @pytest.mark.parametrize("probability", [0.5, 0.9])

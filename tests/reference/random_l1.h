@@ -135,9 +135,16 @@ public:
         m.F              = F_table_.data();
         m.c              = c_table_.data();
         m.M              = (engine == BLW_L1_ADMM) ? M_table_.data() : nullptr;
-        m.rho            = (engine == BLW_L1_ADMM) ? BLW_R(0.3) : BLW_R(0.0);
-        m.kappa_G        = static_cast<blw_real_t>(kappa_G_);
-        m.kappa_W        = static_cast<blw_real_t>(kappa_W_);
+        if (engine == BLW_L1_TABLEAU) {
+            m.Z = nullptr;
+            m.S = S_table_.data();
+            m.W = W_table_.data();
+            m.G = G_table_.data();
+            m.P = P_table_.data();
+        }
+        m.rho     = (engine == BLW_L1_ADMM) ? BLW_R(0.3) : BLW_R(0.0);
+        m.kappa_G = static_cast<blw_real_t>(kappa_G_);
+        m.kappa_W = static_cast<blw_real_t>(kappa_W_);
         return m;
     }
 
@@ -188,6 +195,18 @@ private:
         F_                                   = P * G_.transpose() * W_.inverse();
     }
 
+    // Lower triangle, packed by rows.
+    static std::vector<blw_real_t> lower(const Matrix &M)
+    {
+        std::vector<blw_real_t> packed;
+        for (Eigen::Index i = 0; i < M.rows(); ++i) {
+            for (Eigen::Index j = 0; j <= i; ++j) {
+                packed.push_back(static_cast<blw_real_t>(M(i, j)));
+            }
+        }
+        return packed;
+    }
+
     void convert()
     {
         const int d = N_ - n_;
@@ -210,6 +229,14 @@ private:
                 F_table_.push_back(static_cast<blw_real_t>(F_(i, j)));
             }
         }
+        for (int i = 0; i < N_; ++i) {
+            for (int j = 0; j < n_; ++j) {
+                G_table_.push_back(static_cast<blw_real_t>(G_(i, j)));
+            }
+        }
+        S_table_ = lower(Z_ * Z_.transpose());
+        W_table_ = lower(W_);
+        P_table_ = lower(F_ * W_ * F_.transpose());
         Vector rows_c(N_);
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             c_table_.push_back(static_cast<blw_real_t>(c_(g)));
@@ -230,6 +257,7 @@ private:
     std::vector<uint16_t>   first_;
     Matrix                  G_, W_, Z_, F_;
     std::vector<blw_real_t> Z_table_, F_table_, c_table_, M_table_;
+    std::vector<blw_real_t> S_table_, W_table_, G_table_, P_table_;
     double                  kappa_G_ = 0.0;
     double                  kappa_W_ = 0.0;
 };

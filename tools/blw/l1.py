@@ -28,6 +28,7 @@ Array = NDArray[Any]
 
 ENGINE_ACTIVE_SET = 1
 ENGINE_ADMM = 2
+ENGINE_TABLEAU = 3
 
 #: Part of a row's information that is redundant; below this it is rounding.
 _NOT_REDUNDANT = 1e-12
@@ -237,6 +238,9 @@ def struct(
     N, d = Z.shape
     c = thresholds(reduced_form, groups, gamma)
     kappa_G, kappa_W = kappas(reduced_form, groups, c)
+    tableau = engine.code == ENGINE_TABLEAU
+    packed = "[N(N+1)/2] packed lower"
+    scaled_F = F / reduced_form.scale
     M = None if engine.M is None else table(pack_lower(engine.M), "[N(N+1)/2] (S + rho I)^-1")
     return Struct(
         "blw_l1_model_t",
@@ -249,10 +253,15 @@ def struct(
             "n": F.shape[0],
             "engine": engine.code,
             "first": index(groups.first, "[n_groups + 1] first row of each group, then N"),
-            "Z": table(pack_trapezoid(Z), f"[{N} x {d}] lower trapezoid, packed by rows"),
-            "F": table(F / reduced_form.scale, f"[{F.shape[0]} x {N}]"),
+            "Z": None if tableau else table(pack_trapezoid(Z), f"[{N} x {d}] trapezoid, packed"),
+            "F": table(scaled_F, f"[{F.shape[0]} x {N}]"),
             "c": table(c, "[n_groups] gamma w_g / s_g"),
             "M": M,
+            "S": table(pack_lower(reduced_form.S), f"{packed}: Z Z'") if tableau else None,
+            "W": table(pack_lower(reduced_form.W), packed) if tableau else None,
+            "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if tableau else None,
+            "P": table(pack_lower(scaled_F @ reduced_form.W @ scaled_F.T), "[n(n+1)/2] F W F'")
+            if tableau else None,
             "rho": real(engine.rho),
             "kappa_G": real(kappa_G),
             "kappa_W": real(kappa_W),

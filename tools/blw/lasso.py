@@ -174,7 +174,8 @@ def choose_engine(
     pivots = (8 if paired else 4) * N
     if options.engine != "admm":
         bound = options.max_iterations or pivots
-        return l1.Engine(l1.ENGINE_ACTIVE_SET, bound), {
+        code = l1.ENGINE_ACTIVE_SET if paired else l1.ENGINE_TABLEAU
+        return l1.Engine(code, bound), {
             "engine": "active_set",
             "max_iterations": bound,
         }

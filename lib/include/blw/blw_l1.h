@@ -24,7 +24,8 @@ extern "C" {
 
 typedef enum blw_l1_engine {
     BLW_L1_ACTIVE_SET = 1, /**< pivots between supports; Newton steps where groups have two rows */
-    BLW_L1_ADMM       = 2  /**< alternating directions, then the same solve on the support found */
+    BLW_L1_ADMM       = 2, /**< alternating directions, then the same solve on the support found */
+    BLW_L1_TABLEAU    = 3  /**< groups of one row only: pivots on the tableau of S, verified in W */
 } blw_l1_engine_t;
 
 typedef struct blw_l1_model {
@@ -35,15 +36,19 @@ typedef struct blw_l1_model {
     uint8_t           n;              /**< states */
     uint8_t           engine;         /**< blw_l1_engine_t */
     const uint16_t   *first;          /**< [n_groups + 1] first row of each group, then N */
-    const blw_real_t *Z;              /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid */
-    const blw_real_t *F;              /**< [n x N] */
-    const blw_real_t *c;              /**< [n_groups] thresholds, > 0 */
-    const blw_real_t *M;              /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
+    const blw_real_t *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
+    const blw_real_t *F;       /**< [n x N] */
+    const blw_real_t *c;       /**< [n_groups] thresholds, > 0 */
+    const blw_real_t *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
                                            NULL otherwise */
-    blw_real_t        rho;            /**< ADMM: penalty, > 0; 0 otherwise */
-    blw_real_t        kappa_G;        /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
+    const blw_real_t *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
+    const blw_real_t *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
+    const blw_real_t *G;       /**< tableau: [N x n], or NULL */
+    const blw_real_t *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
+    blw_real_t        rho;     /**< ADMM: penalty, > 0; 0 otherwise */
+    blw_real_t        kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
                                            least |x| / kappa_G */
-    blw_real_t        kappa_W;        /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
+    blw_real_t        kappa_W; /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
 } blw_l1_model_t;
 
 /** Solver state: the support A found last, from which the next solve starts. */
@@ -81,10 +86,17 @@ typedef struct blw_l1_info {
  *  whose curvature holds them apart. */
 #define BLW_L1_ROWS(N, d, n_groups) (((n_groups) == (N)) ? ((size_t)(d) + 1U) : (size_t)(N))
 
-/** Number of blw_real_t that init() needs, whatever the engine. */
-#define BLW_L1_MEM(N, d, n_groups) \
+/** Number of blw_real_t that init() needs: engines on Z, and the tableau. */
+#define BLW_L1_MEM_Z(N, d, n_groups) \
     ((4U * (size_t)(N)) + (2U * (size_t)(d)) + (size_t)(n_groups) \
      + ((BLW_L1_ROWS(N, d, n_groups) * (BLW_L1_ROWS(N, d, n_groups) + 1U)) / 2U))
+#define BLW_L1_MEM_TABLEAU(N, d) \
+    ((5U * (size_t)(N)) - (size_t)(d) \
+     + ((((2U * (size_t)(N)) - (size_t)(d)) * (((2U * (size_t)(N)) - (size_t)(d)) + 1U)) / 2U))
+/** The same, whatever the engine. */
+#define BLW_L1_MEM(N, d, n_groups) \
+    ((BLW_L1_MEM_Z(N, d, n_groups) > BLW_L1_MEM_TABLEAU(N, d)) ? BLW_L1_MEM_Z(N, d, n_groups) \
+                                                               : BLW_L1_MEM_TABLEAU(N, d))
 
 /** Add the tables to a walk and check dimensions, groups, signs and the engine. */
 blw_status_t blw_l1_check(const blw_l1_model_t *model, blw_table_check_t *check);

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: MIT */
+/* Solve of the optimality conditions of (1) in blw_l1.h for a given A, in the covariance W.  With
+ * mu = W l the minimiser satisfies zeta = G x + W l + nu, G' l = 0, nu_f = 0 on the rows f outside A and
+ * l_A = c_A s_A on A:
+ *     [ W_ff  G_f ] [ l_f ]   [ zeta_f - W_fA l_A ]
+ *     [ G_f'  0   ] [ x   ] = [ -G_A' l_A         ],      nu_A = zeta_A - W_A l - G_A x.        (1)
+ * It stays accurate where W is so ill-conditioned that S and its factors are not, because few rows
+ * are in f; and it needs nothing of how A was found, so signs and sizes that survive it certify the
+ * minimum.  The matrix is factored as L D L', D = diag(I, -I). */
+#include "blw_l1_internal.h"
+
+/* Least pivot of L: rows of W have about unit variance or more. */
+#define PIVOT_MIN BLW_REAL_EPS
+
+/* Row and length of the factor: free rows first, then the n columns of G. */
+typedef struct factor {
+    size_t f;    /* rows outside A */
+    size_t size; /* f + n */
+} factor_t;
+
+static blw_real_t *row_of_L(const blw_l1_t *self, size_t r)
+{
+    return &self->L[blw_la_packed_row(r)];
+}
+
+/* Finish row r of L, which holds the matrix up to column r: the first f columns count +, others -. */
+static void reduce_row(const blw_l1_t *self, size_t f, size_t r)
+{
+    blw_real_t *const Lr = row_of_L(self, r);
+
+    for (size_t q = 0U; q <= r; q++) {
+        const blw_real_t *const Lq   = row_of_L(self, q);
+        const size_t            plus = (q < f) ? q : f;
+        blw_real_t              rest = Lr[q] - blw_la_dot(plus, Lr, Lq);
+        if (q >= f) {
+            rest = -rest - blw_la_dot(q - f, &Lr[f], &Lq[f]);
+        }
+        Lr[q] = (q < r) ? (rest / Lq[q]) : blw_la_sqrt(blw_la_max(rest, PIVOT_MIN * PIVOT_MIN));
+    }
+}
+
+static factor_t factorise(blw_l1_t *self)
+{
+    const blw_l1_model_t *const m    = self->model;
+    factor_t                    made = {0U, 0U};
+
+    for (size_t i = 0U; i < m->N; i++) {
+        if (!blw_l1_clipped(self, i)) {
+            const blw_real_t *const Wi = &m->W[blw_la_packed_row(i)];
+            blw_real_t *const       Lr = row_of_L(self, made.f);
+            size_t                  q  = 0U;
+            for (size_t j = 0U; j <= i; j++) {
+                if (!blw_l1_clipped(self, j)) {
+                    Lr[q] = Wi[j];
+                    q++;
+                }
+            }
+            reduce_row(self, made.f + 1U, made.f);
+            made.f++;
+        }
+    }
+    for (size_t k = 0U; k < m->n; k++) {
+        blw_real_t *const Lr = row_of_L(self, made.f + k);
+        size_t            q  = 0U;
+        for (size_t i = 0U; i < m->N; i++) {
+            if (!blw_l1_clipped(self, i)) {
+                Lr[q] = m->G[(i * m->n) + k];
+                q++;
+            }
+        }
+        blw_la_fill(k + 1U, BLW_R(0.0), &Lr[made.f]);
+        reduce_row(self, made.f, made.f + k);
+    }
+    made.size = made.f + m->n;
+    return made;
+}
+
+void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h)
+{
+    const size_t n = self->model->n;
+
+    for (size_t j = 0U; j < n; j++) {
+        const blw_real_t *G   = &self->model->G[j];
+        blw_real_t        sum = BLW_R(0.0);
+        for (size_t i = 0U; i < self->model->N; i++) {
+            sum += self->l[i] * *G;
+            G += n;
+        }
+        h[j] = -sum;
+    }
+}
+
+/* tau = W l + G x, and the residual of (1) in self->step. */
+static void residual(blw_l1_t *self, const blw_real_t *zeta, const blw_real_t *x)
+{
+    const blw_l1_model_t *const m = self->model;
+    size_t                      q = 0U;
+
+    blw_la_symv(m->N, m->W, self->l, self->tau);
+    blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
+    for (size_t i = 0U; i < m->N; i++) {
+        if (!blw_l1_clipped(self, i)) {
+            self->step[q] = zeta[i] - self->tau[i];
+            q++;
+        }
+    }
+    blw_l1_imbalance(self, &self->step[q]);
+}
+
+/* Correct l_f and x by the residual.  @return |dx|. */
+static blw_real_t correct(blw_l1_t *self, factor_t made, blw_real_t *x)
+{
+    const blw_l1_model_t *const m = self->model;
+    size_t                      q = 0U;
+
+    blw_la_solve_lower(made.size, self->L, self->step);
+    for (size_t k = made.f; k < made.size; k++) {
+        self->step[k] = -self->step[k];
+    }
+    blw_la_solve_lower_t(made.size, self->L, self->step);
+    for (size_t i = 0U; i < m->N; i++) {
+        if (!blw_l1_clipped(self, i)) {
+            self->l[i] += self->step[q];
+            q++;
+        }
+    }
+    blw_la_axpy(m->n, BLW_R(1.0), &self->step[made.f], x);
+    return blw_la_norm(m->n, &self->step[made.f]);
+}
+
+bool blw_l1_kkt(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+{
+    const blw_l1_model_t *const m    = self->model;
+    const factor_t              made = factorise(self);
+
+    for (size_t i = 0U; i < m->N; i++) {
+        self->l[i] = m->c[i] * self->dir[i];
+    }
+    blw_la_fill(m->n, BLW_R(0.0), x);
+    residual(self, zeta, x);
+    (void)correct(self, made, x);
+    residual(self, zeta, x);
+    *bound = correct(self, made, x);
+    for (size_t i = 0U; i < m->N; i++) {
+        self->tau[i] = blw_l1_clipped(self, i) ? self->tau[i] : zeta[i];
+    }
+    return blw_l1_holds(self, zeta);
+}
