@@ -18,10 +18,20 @@ _STORAGE = ("estimator", "estimator_mem")
 
 def flash_bytes(program: Program) -> int:
     """Code and tables of the estimator that is linked into the program."""
+    return sum(size for _, size, owner in _sections(program) if _OURS.search(owner))
+
+
+def table_bytes(program: Program) -> int:
+    """The tables of the model alone."""
+    return sum(size for kind, size, owner in _sections(program)
+               if kind != "text" and f"libblw_model_{program.model}.a(" in owner)
+
+
+def _sections(program: Program) -> list[tuple[str, int, str]]:
+    """Kind, size and object file of every section that the linker kept."""
     text = program.map.read_text(encoding="utf-8").split("Linker script and memory map")[1]
     one_line = re.sub(r"^( \.\S+)\n +", r"\1 ", text, flags=re.MULTILINE)
-    return sum(int(size, 16) for _, size, owner in _SECTION.findall(one_line)
-               if _OURS.search(owner))
+    return [(kind, int(size, 16), owner) for kind, size, owner in _SECTION.findall(one_line)]
 
 
 def ram_bytes(program: Program) -> int:
