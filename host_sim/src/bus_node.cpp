@@ -190,16 +190,20 @@ void listen(const Nodes &nodes, std::uint64_t idle_s)
     blw_port_t *const port    = links.front()->port();
     std::uint64_t     last_us = blw_port_now_us(port);
     while (!all_done(nodes) && !bus_interrupted) {
+        const bool over = links.front()->ended(); /* looked at before the last frames are taken */
         for (const auto &node : nodes) {
             if (node->advance()) {
                 last_us = blw_port_now_us(port);
             }
         }
-        if ((idle_s > 0U) && (blw_port_now_us(port) > (last_us + idle_s * SECOND))) {
+        const bool silent = blw_port_now_us(port) > (last_us + (idle_s * SECOND));
+        if (over || ((idle_s > 0U) && silent)) {
             return;
         }
-        if (!links.front()->down() || (links.front()->handle() >= 0)) {
+        if (links.front()->handle() >= 0) {
             wait_for(links, WAIT_MS);
+        } else if (links.front()->down()) {
+            wait_for({}, WAIT_MS);
         }
     }
 }

@@ -139,6 +139,10 @@ public:
     }
     bool down() const override
     {
+        return false;
+    }
+    bool ended() const override
+    {
         return replay_.ended;
     }
     Json counters() const override

@@ -27,6 +27,11 @@ public:
     /** The link is lost at present. */
     virtual bool down() const     = 0;
     virtual Json counters() const = 0;
+    /** Nothing will ever come again. */
+    virtual bool ended() const
+    {
+        return false;
+    }
     /** Measurements, inputs and estimates in few frames or in many. */
     virtual blw_wire_format_t format() const
     {

@@ -101,6 +101,10 @@ static void join(blw_node_t *self, uint32_t k, uint64_t t_us)
     }
     self->joined = true;
     begin_step(self, t_us);
+    if (k == 0U) { /* the initial state: the first step is the next one */
+        self->k    = 1U;
+        self->open = false;
+    }
 }
 
 static bool too_early(const blw_node_t *self, uint64_t t_us)

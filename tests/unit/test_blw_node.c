@@ -214,6 +214,17 @@ static void test_poll_given_an_end_is_done_and_joins_the_next_run_at_once(void)
     TEST_ASSERT_EQUAL_HEX8(0U, bench_expect(&bench, 2U)->events);
 }
 
+static void test_poll_given_the_sync_of_the_initial_state_makes_no_step_of_it(void)
+{
+    bench_sync(&bench, 0U);
+    bench_expect_none(&bench);
+    blw_ring_wait(&bench.ring, 1000U);
+    bench_send_step(&bench, 1U);
+    const blw_node_report_t *const report = bench_expect(&bench, 1U);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 4.5, report->out.x_hat[0]);
+    TEST_ASSERT_EQUAL_UINT32(1U, bench.node.counters.steps);
+}
+
 static void test_poll_given_a_sync_behind_the_end_shows_the_end_first(void)
 {
     bench_run(&bench, 1U, 3U);
@@ -367,6 +378,7 @@ int main(void)
     RUN_TEST(test_poll_given_a_small_gap_predicts_over_it_once_it_is_confirmed);
     RUN_TEST(test_poll_given_a_plant_that_starts_again_starts_again_too);
     RUN_TEST(test_poll_given_an_end_is_done_and_joins_the_next_run_at_once);
+    RUN_TEST(test_poll_given_the_sync_of_the_initial_state_makes_no_step_of_it);
     RUN_TEST(test_poll_given_a_sync_behind_the_end_shows_the_end_first);
     RUN_TEST(test_poll_given_a_restarted_node_takes_the_step_from_the_sync);
     RUN_TEST(test_poll_given_a_sync_of_another_model_refuses_it);
