@@ -45,7 +45,7 @@ def test_replay_of_a_run_gives_the_same_bytes(blw_sim, tmp_path, scenario):
     path = SCENARIOS / f"{scenario}.toml"
     content = tomllib.loads(path.read_text())
     fed_back = content.get("controller", {}).get("method", "truth")
-    methods = dict.fromkeys(["kalman", "lasso", "kalman" if fed_back == "truth" else fed_back])
+    methods = dict.fromkeys(["kalman", "guard", "kalman" if fed_back == "truth" else fed_back])
     design = write_design(tmp_path, Path(content["model"]).stem, tuple(methods))
     run = blw_sim("run", path, "--design", design, "--out", tmp_path / "run")
     assert run.returncode == 0, run.stderr
