@@ -39,6 +39,20 @@ static void reduce_row(const blw_l1_t *self, size_t f, size_t r)
     }
 }
 
+/* Of `count` numbers, `stride` apart, those of the rows that are not clipped. */
+static void gather(const blw_l1_t *self, const blw_real_t *v, size_t stride, size_t count,
+                   blw_real_t *out)
+{
+    size_t q = 0U;
+
+    for (size_t j = 0U; j < count; j++) {
+        if (!blw_l1_clipped(self, j)) {
+            out[q] = v[j * stride];
+            q++;
+        }
+    }
+}
+
 static factor_t factorise(blw_l1_t *self)
 {
     const blw_l1_model_t *const m    = self->model;
@@ -46,28 +60,14 @@ static factor_t factorise(blw_l1_t *self)
 
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
-            const blw_real_t *const Wi = &m->W[blw_la_packed_row(i)];
-            blw_real_t *const       Lr = row_of_L(self, made.f);
-            size_t                  q  = 0U;
-            for (size_t j = 0U; j <= i; j++) {
-                if (!blw_l1_clipped(self, j)) {
-                    Lr[q] = Wi[j];
-                    q++;
-                }
-            }
+            gather(self, &m->W[blw_la_packed_row(i)], 1U, i + 1U, row_of_L(self, made.f));
             reduce_row(self, made.f + 1U, made.f);
             made.f++;
         }
     }
     for (size_t k = 0U; k < m->n; k++) {
         blw_real_t *const Lr = row_of_L(self, made.f + k);
-        size_t            q  = 0U;
-        for (size_t i = 0U; i < m->N; i++) {
-            if (!blw_l1_clipped(self, i)) {
-                Lr[q] = m->G[(i * m->n) + k];
-                q++;
-            }
-        }
+        gather(self, &m->G[k], m->n, m->N, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[made.f]);
         reduce_row(self, made.f, made.f + k);
     }

@@ -8,7 +8,7 @@
 #define M     3U
 #define MEM   BLW_LASSO_MEM(1, M, 3, 2, 3, 0)
 #define MODEL 0x00c0ffeeU
-#define SLOTS 256U
+#define SLOTS 64U
 
 static support_lasso_t     made;
 static blw_lasso_t         central;
