@@ -150,18 +150,32 @@ private:
     void take_sync(const blw_frame_t &frame)
     {
         blw_wire_sync_t sync;
-        if ((blw_wire_get_sync(&frame, &sync) == BLW_WIRE_OK) && (sync.k != own_sync_)
+        if ((blw_wire_get_sync(&frame, &sync) == BLW_WIRE_OK)
             && (sync.model == (model_ & BLW_WIRE_MODEL_BITS))) {
-            if ((sync.k == BLW_WIRE_K_END) || (sync.k != k_)) {
-                attack(); /* the step before, if samples of it are missing */
-            }
-            ended_ = sync.k == BLW_WIRE_K_END;
-            if (!ended_ && (sync.k != k_)) {
-                clear();
-                k_ = sync.k;
-            }
+            follow(sync.k);
         }
         forward(*node_side_, frame);
+    }
+
+    void follow(std::uint32_t k)
+    {
+        const bool end = k == BLW_WIRE_K_END;
+        if ((k == k_) || (!end && is_ours(k))) {
+            return;
+        }
+        attack(); /* the step before, if samples of it are missing */
+        if (end) {
+            ended_ = true; /* for good: what we sent ourselves may still come after it */
+        } else {
+            clear();
+            k_ = k;
+        }
+    }
+
+    /* A link may hear itself, some steps late. */
+    bool is_ours(std::uint32_t k) const
+    {
+        return (own_sync_ > 0U) && ((own_sync_ - k) < FAR_AHEAD / 2U);
     }
 
     /* The first value of a sensor in a step is the true one; ours comes later. */
@@ -272,7 +286,7 @@ private:
         } else if (fault == "early") {
             frame = value_frame(BLW_WIRE_MEASUREMENT, k_ + ANOTHER_STEP, 0U, FORGED);
         } else if (fault == "sync") {
-            own_sync_ = static_cast<std::uint32_t>(k_ + FAR_AHEAD); /* a link may hear itself */
+            own_sync_ = static_cast<std::uint32_t>(k_ + FAR_AHEAD);
             frame     = sync_frame(own_sync_, model_);
         } else if (fault == "garbage") {
             frame.len = 5U;
