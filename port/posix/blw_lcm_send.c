@@ -99,7 +99,7 @@ static bool publish_values(blw_port_lcm_t *self, const blw_frame_t *frame)
     batch->seq = values.seq;
     for (size_t j = 0U; j < values.count; j++) {
         batch->value[values.first + j] = (double)values.value[j];
-        batch->valid[values.first + j] = (int8_t)((values.valid >> j) & 1U);
+        batch->valid[values.first + j] = (int8_t)(((unsigned)values.valid >> j) & 1U);
     }
     if ((end != all) && !single) {
         return true;

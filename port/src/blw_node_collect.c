@@ -136,7 +136,7 @@ static void take_sensor(blw_node_t *self, const blw_wire_values_t *values, size_
                         size_t part, size_t j)
 {
     const int32_t    steps = age(values->seq, self->k);
-    const bool       valid = ((values->valid >> j) & 1U) != 0U;
+    const bool       valid = (((unsigned)values->valid >> j) & 1U) != 0U;
     const blw_real_t value = (blw_real_t)values->value[j];
 
     if (part == 0U) {
@@ -156,7 +156,7 @@ static void take_sensor(blw_node_t *self, const blw_wire_values_t *values, size_
 
 static bool bit(const uint8_t *bits, size_t i)
 {
-    return ((bits[i / 8U] >> (i % 8U)) & 1U) != 0U;
+    return (((unsigned)bits[i / 8U] >> (i % 8U)) & 1U) != 0U;
 }
 
 static void set_bit(uint8_t *bits, size_t i)
@@ -192,7 +192,7 @@ static void take_inputs(blw_node_t *self, const blw_wire_values_t *values)
         return;
     }
     for (size_t j = 0U; j < values->count; j++) {
-        if (((values->valid >> j) & 1U) != 0U) {
+        if ((((unsigned)values->valid >> j) & 1U) != 0U) {
             take_input(self, (size_t)values->first + j, (blw_real_t)values->value[j]);
         }
     }

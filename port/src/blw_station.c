@@ -36,7 +36,7 @@ blw_status_t blw_station_init(blw_station_t *self, uint32_t model, blw_wire_form
 
 static bool seen(const blw_station_t *self, size_t i)
 {
-    return ((self->u_seen[i / 8U] >> (i % 8U)) & 1U) != 0U;
+    return (((unsigned)self->u_seen[i / 8U] >> (i % 8U)) & 1U) != 0U;
 }
 
 static void settle_inputs(blw_station_t *self)
@@ -168,7 +168,7 @@ static void take_inputs(blw_station_t *self, const blw_frame_t *frame)
         return;
     }
     for (size_t j = 0U; j < values.count; j++) {
-        if (((values.valid >> j) & 1U) != 0U) {
+        if ((((unsigned)values.valid >> j) & 1U) != 0U) {
             take_input(self, (size_t)values.first + j, (blw_real_t)values.value[j]);
         }
     }
