@@ -2,23 +2,13 @@
 """The C library's bank behind ctypes, compiled by the test itself: float or double, any model."""
 
 import ctypes as ct
-import shutil
-import subprocess
-import zlib
 from pathlib import Path
 
 import numpy as np
-import pytest
+from c_library import CLibrary, common_layouts, compile_method
 
-from blw.design import plant_tables
-from blw.tables import Struct
-
-LIB = Path(__file__).resolve().parents[2] / "lib"
-SOURCES = ("blw_la", "blw_model", "blw_step", "blw_bank", "blw_bank_check", "blw_bank_judge")
-FLAGS = ["-std=c99", "-ffp-contract=off", "-O2", "-fPIC", "-shared"]
+MODULES = ("blw_bank", "blw_bank_check", "blw_bank_judge")
 METHOD_BANK = 6
-
-MISSING, DEGRADED = 1, 2  # BLW_FLAG_...
 
 # Steps through a whole record: a call through ctypes takes longer than a step.
 LOOP = """
@@ -47,35 +37,20 @@ int record(blw_bank_t *bank, const blw_real_t *y, const blw_real_t *u, size_t st
 
 
 def compile_library(folder: Path, width: str) -> Path:
-    """libblw_bank as a shared object; width is "f32" or "f64".  Skips without a C compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    target = folder / f"bank_{width}.so"
+    """bank as a shared object; width is "f32" or "f64".  Skips without a C compiler."""
     loop = folder / "loop.c"
     loop.write_text(LOOP)
-    define = ["-DBLW_REAL_DOUBLE"] if width == "f64" else []
-    files = [str(LIB / "src" / f"{name}.c") for name in SOURCES]
-    subprocess.run([compiler, *FLAGS, *define, f"-I{LIB / 'include'}", f"-I{LIB / 'src'}", *files,
-                    str(loop), "-lm", "-o", str(target)], check=True)
-    return target
+    return compile_method(folder, "bank", width, MODULES, [loop])
 
 
 def layouts(real: type) -> dict[str, type]:
     """The public structures for one width of blw_real_t."""
     pointer, byte, word = ct.POINTER(real), ct.c_uint8, ct.c_uint16
     words = ct.POINTER(word)
-
-    class Plant(ct.Structure):
-        _fields_ = [(k, byte) for k in "nmlp"] + [
-            (k, pointer) for k in ("A", "Bu", "C", "offset", "y_min", "y_max", "x0")]
-
-    class Head(ct.Structure):
-        _fields_ = [("abi", word), ("method", byte), ("crc", ct.c_uint32),
-                    ("plant", ct.POINTER(Plant))]
+    common = common_layouts(real)
 
     class BankModel(ct.Structure):
-        _fields_ = ([("head", Head)]
+        _fields_ = ([("head", common["head"])]
                     + [(k, byte) for k in ("sets", "subsets", "per_set", "horizon", "groups",
                                            "filtered")]
                     + [(k, word) for k in ("window", "warm_up")]
@@ -91,41 +66,16 @@ def layouts(real: type) -> dict[str, type]:
                     + [("k", word), ("blocks", word), ("newest", byte), ("choice", byte),
                        ("decided", ct.c_bool), ("age", byte * 8), ("wait", byte * 28)])
 
-    class Out(ct.Structure):
-        _fields_ = [("x_hat", pointer), ("suspicion", pointer), ("statistic", real),
-                    ("threshold", real), ("bound", real), ("excluded", ct.c_uint64),
-                    ("used", ct.c_uint64), ("iterations", word), ("outcome", byte),
-                    ("flags", byte)]
-
-    return {"plant": Plant, "model": BankModel, "bank": Bank, "out": Out}
+    return common | {"model": BankModel, "bank": Bank}
 
 
-class BankLibrary:
-    """One bank in the C library.
-
-    library  what compile_library made; model, kalman, designed: as the design tool returns them
-    """
+class BankLibrary(CLibrary):
+    """One bank in the C library; arguments as CLibrary."""
 
     def __init__(self, library: Path, model, kalman, designed):
-        self.double = library.stem.endswith("f64")
-        self.real = ct.c_double if self.double else ct.c_float
-        self.dtype = np.float64 if self.double else np.float32
-        self.lib = ct.CDLL(str(library))
-        self.n, self.m, self.l = model.n, model.m, model.l
-        self._keep: list[object] = []
-        types = layouts(self.real)
-        plant = plant_tables(model, kalman)
-        self.plant = self._fill(types["plant"], plant)
-        self.model = self._fill(types["model"], designed.tables)
-        crc = 0
-        for struct in (plant, designed.tables):
-            for values in struct.reals():
-                crc = zlib.crc32(values.astype(self.dtype).tobytes(), crc)
-        self.model.head.abi = 0x0100 + ct.sizeof(self.real)
-        self.model.head.method, self.model.head.crc = METHOD_BANK, crc
-        self.model.head.plant = ct.pointer(self.plant)
+        super().__init__(library, model, kalman, designed, METHOD_BANK, layouts)
         self.memory = (self.real * designed.info["footprint"]["memory_numbers"])()
-        self.self, self.out = types["bank"](), types["out"]()
+        self.self = self.types["bank"]()
         self.status = self.init()
 
     def init(self) -> int:
@@ -164,22 +114,3 @@ class BankLibrary:
                                  verdict.ctypes.data_as(ct.POINTER(ct.c_int)))
         assert status == 0
         return (x.astype(float), *verdict.T, statistic.astype(float), averages.astype(float))
-
-    def _array(self, values):
-        if values is None:
-            return None
-        values = np.asarray(values, dtype=self.dtype).ravel()
-        return (self.real * len(values))(*values.tolist())
-
-    def _fill(self, kind: type, struct: Struct):
-        target = kind()
-        fields = dict(target._fields_)
-        for name, value in struct.to_json().items():
-            if isinstance(value, list):
-                element = fields[name]._type_
-                array = (element * len(value))(*value)
-                self._keep.append(array)
-                value = ct.cast(array, ct.POINTER(element))
-            if value is not None:
-                setattr(target, name, value)
-        return target

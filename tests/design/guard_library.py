@@ -2,55 +2,28 @@
 """The C library's guard behind ctypes, compiled by the test itself: float or double, any model."""
 
 import ctypes as ct
-import shutil
-import subprocess
-import zlib
 from pathlib import Path
 
 import numpy as np
-import pytest
+from c_library import CLibrary, common_layouts, compile_method
 
-from blw.design import plant_tables
-from blw.tables import Struct
-
-LIB = Path(__file__).resolve().parents[2] / "lib"
-SOURCES = ("blw_la", "blw_model", "blw_step", "blw_guard", "blw_guard_check", "blw_guard_search",
-           "blw_guard_solve", "blw_guard_beside", "blw_guard_bound", "blw_guard_filters",
-           "blw_guard_S")
-FLAGS = ["-std=c99", "-ffp-contract=off", "-O2", "-fPIC", "-shared"]
+MODULES = ("blw_guard", "blw_guard_check", "blw_guard_search", "blw_guard_solve",
+           "blw_guard_beside", "blw_guard_bound", "blw_guard_filters", "blw_guard_S")
 METHOD_GUARD = 7
-
-KALMAN, CONVERGED, BOUND, HELD = range(4)
-MISSING, DEGRADED, BLIND, WARMING_UP = 1, 2, 4, 8
 
 
 def compile_library(folder: Path, width: str) -> Path:
-    """libblw_guard as a shared object; width is "f32" or "f64".  Skips without a C compiler."""
-    compiler = shutil.which("cc") or shutil.which("gcc")
-    if compiler is None:
-        pytest.skip("no C compiler")
-    target = folder / f"guard_{width}.so"
-    define = ["-DBLW_REAL_DOUBLE"] if width == "f64" else []
-    files = [str(LIB / "src" / f"{name}.c") for name in SOURCES]
-    subprocess.run([compiler, *FLAGS, *define, f"-I{LIB / 'include'}", f"-I{LIB / 'src'}", *files,
-                    "-lm", "-o", str(target)], check=True)
-    return target
+    """guard as a shared object; width is "f32" or "f64".  Skips without a C compiler."""
+    return compile_method(folder, "guard", width, MODULES)
 
 
 def layouts(real: type) -> dict[str, type]:
     """The public structures for one width of blw_real_t."""
     pointer, byte, word = ct.POINTER(real), ct.c_uint8, ct.c_uint16
-
-    class Plant(ct.Structure):
-        _fields_ = [(k, byte) for k in "nmlp"] + [
-            (k, pointer) for k in ("A", "Bu", "C", "offset", "y_min", "y_max", "x0")]
-
-    class Head(ct.Structure):
-        _fields_ = [("abi", word), ("method", byte), ("crc", ct.c_uint32),
-                    ("plant", ct.POINTER(Plant))]
+    common = common_layouts(real)
 
     class GuardModel(ct.Structure):
-        _fields_ = ([("head", Head)]
+        _fields_ = ([("head", common["head"])]
                     + [(k, byte) for k in ("r", "reach", "n_u", "n_units", "most", "search",
                                          "pairs")]
                     + [(k, word) for k in ("max_updates", "warm_up")]
@@ -69,13 +42,7 @@ def layouts(real: type) -> dict[str, type]:
                     + [(k, ct.c_uint64) for k in ("all", "attacked", "excluded")]
                     + [(k, word) for k in ("updates", "warm_up")])
 
-    class Out(ct.Structure):
-        _fields_ = [("x_hat", pointer), ("suspicion", pointer), ("statistic", real),
-                    ("threshold", real), ("bound", real), ("excluded", ct.c_uint64),
-                    ("used", ct.c_uint64), ("iterations", word), ("outcome", byte),
-                    ("flags", byte)]
-
-    return {"plant": Plant, "model": GuardModel, "guard": Guard, "out": Out}
+    return common | {"model": GuardModel, "guard": Guard}
 
 
 def memory_numbers(n: int, m: int, r: int, most: int) -> int:
@@ -83,31 +50,13 @@ def memory_numbers(n: int, m: int, r: int, most: int) -> int:
     return 4 * m * r + 2 * m + 4 * n + 3 * r + most * r * (most * r + 3) // 2
 
 
-class GuardLibrary:
-    """One estimator in the C library.
-
-    library  what compile_library made; model, kalman, designed: as the design tool returns them
-    """
+class GuardLibrary(CLibrary):
+    """One estimator in the C library; arguments as CLibrary."""
 
     def __init__(self, library: Path, model, kalman, designed):
-        self.real = ct.c_double if library.stem.endswith("f64") else ct.c_float
-        self.dtype = np.float64 if library.stem.endswith("f64") else np.float32
-        self.lib = ct.CDLL(str(library))
-        self.n, self.m = model.n, model.m
-        self._keep: list[object] = []
-        types = layouts(self.real)
-        plant = plant_tables(model, kalman)
-        self.plant = self._fill(types["plant"], plant)
-        self.model = self._fill(types["model"], designed.tables)
-        crc = 0
-        for struct in (plant, designed.tables):
-            for values in struct.reals():
-                crc = zlib.crc32(values.astype(self.dtype).tobytes(), crc)
-        self.model.head.abi = 0x0100 + ct.sizeof(self.real)
-        self.model.head.method, self.model.head.crc = METHOD_GUARD, crc
-        self.model.head.plant = ct.pointer(self.plant)
+        super().__init__(library, model, kalman, designed, METHOD_GUARD, layouts)
         self.memory = (self.real * memory_numbers(*designed.mem))()
-        self.self, self.out = types["guard"](), types["out"]()
+        self.self = self.types["guard"]()
         self.status = self.init()
 
     def init(self) -> int:
@@ -142,22 +91,3 @@ class GuardLibrary:
                 suspicion = np.ctypeslib.as_array(self.out.suspicion, (self.m,))
             found["x_hat"][k], found["suspicion"][k] = x_hat, suspicion
         return found
-
-    def _array(self, values):
-        if values is None:
-            return None
-        values = np.asarray(values, dtype=self.dtype).ravel()
-        return (self.real * len(values))(*values.tolist())
-
-    def _fill(self, kind: type, struct: Struct):
-        target = kind()
-        fields = dict(target._fields_)
-        for name, value in struct.to_json().items():
-            if isinstance(value, list):
-                element = fields[name]._type_
-                array = (element * len(value))(*value)
-                self._keep.append(array)
-                value = ct.cast(array, ct.POINTER(element))
-            if value is not None:
-                setattr(target, name, value)
-        return target

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bank_library import DEGRADED, MISSING, BankLibrary, compile_library
+from bank_library import BankLibrary, compile_library
+from c_library import DEGRADED, MISSING
 from golden import MODELS, SHARED
 from scipy.signal import lfilter
 

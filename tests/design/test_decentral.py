@@ -6,17 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from decentral_library import (
-    BLIND,
-    CONVERGED,
-    DEGRADED,
-    HELD,
-    KALMAN,
-    MISSING,
-    WARMING_UP,
-    Decentral,
-    compile_library,
-)
+from c_library import BLIND, CONVERGED, DEGRADED, HELD, KALMAN, MISSING, WARMING_UP
+from decentral_library import Decentral, compile_library
 from decentral_reference import Reference, parse, random_plant, simulate
 from golden import MODELS, SHARED
 from scipy import stats

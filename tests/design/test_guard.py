@@ -8,7 +8,8 @@ import guard_library
 import numpy as np
 import pytest
 import scipy.linalg
-from guard_library import BOUND, CONVERGED, KALMAN, MISSING, WARMING_UP, GuardLibrary
+from c_library import BOUND, CONVERGED, KALMAN, MISSING, WARMING_UP
+from guard_library import GuardLibrary
 from guard_plants import (
     PLANTS,
     colluding_plant,
