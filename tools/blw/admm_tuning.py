@@ -8,7 +8,9 @@ alpha = 1.6, cold start t = u = 0.  The state nu is shifted by zeta on the devic
 that changes no iterate.  What counts is the error of x_hat in benign standard deviations.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +70,23 @@ def attacked_samples(problem: Problem) -> Array:
     return zeta
 
 
+def iterates(reduced: Reduced, groups: Groups, c: Array, l0: Array, rho: float) -> Iterator[Array]:
+    """t [N x k] after every pass of (1), (2) from a cold start, for l0 = S zeta [N x k] and
+    thresholds c [g]; endless."""
+    S = reduced.S
+    limit = c[:, None] / rho
+    M = np.linalg.inv(S + rho * np.eye(S.shape[0]))
+    offset, gain = M @ l0, rho * M
+    t, u = np.zeros_like(l0), np.zeros_like(l0)
+    while True:
+        nu = offset + gain @ (t - u)
+        v = ALPHA * nu + (1.0 - ALPHA) * t + u
+        keep = np.maximum(0.0, 1.0 - limit / np.maximum(groups.norms(v), _TINY))
+        t = groups.spread(keep) * v
+        u = v - t
+        yield t
+
+
 def trajectory(
     problem: Problem, zeta: Array, rho: float, passes: int, settled: Array | None = None
 ) -> Array:
@@ -75,20 +94,11 @@ def trajectory(
 
     Ends early when no x_hat moved by more than settled [n] within _WINDOW passes.
     """
-    S = problem.reduced.S
-    groups = problem.groups
-    limit = thresholds(problem.reduced, groups, problem.gamma)[:, None] / rho
+    c = thresholds(problem.reduced, problem.groups, problem.gamma)
     F = problem.F / problem.reduced.scale
-    M = np.linalg.inv(S + rho * np.eye(S.shape[0]))
-    offset, gain = M @ (S @ zeta), rho * M
-    t, u = np.zeros_like(zeta), np.zeros_like(zeta)
     found = np.empty((passes, F.shape[0], zeta.shape[1]))
-    for index in range(passes):
-        nu = offset + gain @ (t - u)
-        v = ALPHA * nu + (1.0 - ALPHA) * t + u
-        keep = np.maximum(0.0, 1.0 - limit / np.maximum(groups.norms(v), _TINY))
-        t = groups.spread(keep) * v
-        u = v - t
+    run = iterates(problem.reduced, problem.groups, c, problem.reduced.S @ zeta, rho)
+    for index, t in enumerate(islice(run, passes)):
         found[index] = F @ (zeta - t)
         if settled is not None and index % _WINDOW == _WINDOW - 1 and index > _WINDOW:
             if np.all(np.abs(found[index] - found[index - _WINDOW]) <= settled[:, None]):

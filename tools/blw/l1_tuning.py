@@ -11,12 +11,13 @@ a Monte Carlo mean over a fixed sample; the minimisation by ADMM, (1) and (2) of
 The loss falls and the reach of an attacker grows with gamma.
 """
 
+from itertools import islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blw.admm_tuning import ALPHA
+from blw.admm_tuning import iterates
 from blw.l1 import Groups, Reduced, thresholds
 
 Array = NDArray[Any]
@@ -27,7 +28,6 @@ _SAMPLES = (64, 400)
 #: Multiply-adds that one value of the loss may cost.
 _WORK = 2.5e9
 _SEED = 20210513
-_TINY = 1e-300
 #: nu is solved if, in the median sample, no |l_g| exceeds c_g by more than this factor; the loss of
 #: what ADMM reaches is then right to a fifth.
 _EXCEEDED = 2.0
@@ -49,33 +49,18 @@ class BenignLoss:
         self._reduced, self._groups, self._trace_P = reduced, groups, trace_P
         self._F = F / reduced.scale
         self._rho, self._passes = rho, passes
-        M = np.linalg.inv(reduced.S + rho * np.eye(N))
-        self._gain = rho * M
         count = samples or int(np.clip(_WORK / (N * N * passes), *_SAMPLES))
         self._z = np.random.default_rng(_SEED).standard_normal((d, count))
-        self._offset = M @ (reduced.Z @ self._z)
 
     def __call__(self, gamma: float) -> float | None:
         """loss(gamma); None if W is too ill-conditioned to solve (1) at so small a gamma."""
-        nu = self._penalised(gamma)
-        Z = self._reduced.Z
+        Z, c = self._reduced.Z, thresholds(self._reduced, self._groups, gamma)
+        run = iterates(self._reduced, self._groups, c, Z @ self._z, self._rho)
+        nu = next(islice(run, self._passes - 1, None))
         norms = self._groups.norms(Z @ (self._z - Z.T @ nu))
-        limit = thresholds(self._reduced, self._groups, gamma)[:, None]
-        if np.median(np.max(norms / limit, axis=0)) > _EXCEEDED:
+        if np.median(np.max(norms / c[:, None], axis=0)) > _EXCEEDED:
             return None
         return float(np.mean(np.sum((self._F @ nu) ** 2, axis=0)) / self._trace_P)
-
-    def _penalised(self, gamma: float) -> Array:
-        """nu(z; gamma) [N x samples], scaled."""
-        limit = thresholds(self._reduced, self._groups, gamma)[:, None] / self._rho
-        t, u = np.zeros_like(self._offset), np.zeros_like(self._offset)
-        for _ in range(self._passes):
-            nu = self._offset + self._gain @ (t - u)
-            v = ALPHA * nu + (1.0 - ALPHA) * t + u
-            keep = np.maximum(0.0, 1.0 - limit / np.maximum(self._groups.norms(v), _TINY))
-            t = self._groups.spread(keep) * v
-            u = v - t
-        return t
 
     def gamma_for(self, wanted: float, largest: float) -> float:
         """The smallest gamma, at most `largest`, that is solved and loses at most `wanted`."""
