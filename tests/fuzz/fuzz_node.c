@@ -53,9 +53,9 @@ static void make_filter(blw_kalman_t *filter, blw_kalman_model_t *model, blw_rea
 {
     blw_table_check_t check;
 
-    model->head =
-        (blw_model_t){.abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_KALMAN, .plant = &plant};
-    model->K = K;
+    *model = (blw_kalman_model_t){
+        .head = {.abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_KALMAN, .plant = &plant},
+        .K    = K};
     expect(blw_model_begin(&model->head, BLW_METHOD_KALMAN, &check) == BLW_OK);
     blw_table_add(&check, model->K, 2U);
     model->head.crc = check.crc;
