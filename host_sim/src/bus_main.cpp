@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* blw_bus: plant, node and attacker on a bus. */
 #include "bus.h"
-#include "error.h"
-#include <CLI/CLI.hpp>
-#include <algorithm>
+#include "program.h"
 #include <csignal>
 #include <iostream>
 
@@ -21,9 +19,6 @@ void say_listening(const char *who, const std::string &where)
 
 namespace
 {
-
-const int FAILED    = 1;
-const int BAD_INPUT = 2;
 
 void interrupt(int /*signal*/)
 {
@@ -100,49 +95,21 @@ CLI::App *add_attack(CLI::App &app, sim::BusOptions &options)
     return attack;
 }
 
-int complain(const std::string &message, int status)
-{
-    std::string line = message;
-    std::replace(line.begin(), line.end(), '\n', ' ');
-    std::cerr << "blw_bus: " << line << "\n";
-    return status;
-}
-
-int command(int argc, char **argv)
-{
-    CLI::App        app("Bulwark's plant, nodes and attacker on a bus.", "blw_bus");
-    sim::BusOptions options;
-    app.set_version_flag("--version", "blw_bus " + sim::version_text());
-    app.require_subcommand(1);
-    CLI::App *plant = add_plant(app, options);
-    CLI::App *node  = add_node(app, options);
-    add_attack(app, options);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::Success &help_or_version) {
-        return app.exit(help_or_version);
-    } catch (const CLI::ParseError &error) {
-        return complain(std::string(error.what()) + "; see --help", BAD_INPUT);
-    }
-    if (plant->parsed()) {
-        return sim::plant_command(options);
-    }
-    return node->parsed() ? sim::node_command(options) : sim::attack_command(options);
-}
-
 } // namespace
 
 int main(int argc, char **argv)
 {
     std::signal(SIGINT, interrupt);
     std::signal(SIGTERM, interrupt);
-    try {
-        return command(argc, argv);
-    } catch (const sim::InputError &error) {
-        return complain(error.what(), BAD_INPUT);
-    } catch (const std::bad_alloc &) {
-        return complain("not enough memory", FAILED);
-    } catch (const std::exception &error) {
-        return complain(error.what(), FAILED);
-    }
+    CLI::App        app("Bulwark's plant, nodes and attacker on a bus.", "blw_bus");
+    sim::BusOptions options;
+    const CLI::App *plant = add_plant(app, options);
+    const CLI::App *node  = add_node(app, options);
+    add_attack(app, options);
+    return sim::run_program(app, argc, argv, [&] {
+        if (plant->parsed()) {
+            return sim::plant_command(options);
+        }
+        return node->parsed() ? sim::node_command(options) : sim::attack_command(options);
+    });
 }

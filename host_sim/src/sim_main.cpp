@@ -1,17 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* blw_sim: the library's estimators on simulated and on recorded measurements. */
 #include "commands.h"
-#include "error.h"
-#include <CLI/CLI.hpp>
-#include <algorithm>
-#include <iostream>
-#include <new>
+#include "program.h"
 
 namespace
 {
-
-const int FAILED    = 1;
-const int BAD_INPUT = 2;
 
 void add_common(CLI::App &command, sim::Options &options)
 {
@@ -54,43 +47,15 @@ CLI::App *add_replay(CLI::App &app, sim::Options &options)
     return replay;
 }
 
-int complain(const std::string &message, int status)
-{
-    std::string line = message;
-    std::replace(line.begin(), line.end(), '\n', ' ');
-    std::cerr << "blw_sim: " << line << "\n";
-    return status;
-}
-
-int command(int argc, char **argv)
-{
-    CLI::App     app("Bulwark's estimators on simulated and recorded measurements.", "blw_sim");
-    sim::Options options;
-    app.set_version_flag("--version", "blw_sim " + sim::version_text());
-    app.require_subcommand(1);
-    CLI::App *run = add_run(app, options);
-    add_replay(app, options);
-    try {
-        app.parse(argc, argv);
-    } catch (const CLI::Success &help_or_version) {
-        return app.exit(help_or_version);
-    } catch (const CLI::ParseError &error) {
-        return complain(std::string(error.what()) + "; see --help", BAD_INPUT);
-    }
-    return run->parsed() ? sim::run_command(options) : sim::replay_command(options);
-}
-
 } // namespace
 
 int main(int argc, char **argv)
 {
-    try {
-        return command(argc, argv);
-    } catch (const sim::InputError &error) {
-        return complain(error.what(), BAD_INPUT);
-    } catch (const std::bad_alloc &) {
-        return complain("not enough memory", FAILED);
-    } catch (const std::exception &error) {
-        return complain(error.what(), FAILED);
-    }
+    CLI::App        app("Bulwark's estimators on simulated and recorded measurements.", "blw_sim");
+    sim::Options    options;
+    const CLI::App *run = add_run(app, options);
+    add_replay(app, options);
+    return sim::run_program(app, argc, argv, [&] {
+        return run->parsed() ? sim::run_command(options) : sim::replay_command(options);
+    });
 }
