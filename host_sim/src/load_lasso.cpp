@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_lasso.h"
 #include "methods.h"
+#include <map>
 
 namespace sim
 {
@@ -35,6 +36,20 @@ void load_jordan(TableReader tables, const blw_plant_t &plant, blw_jordan_model_
     model.G             = tables.reals("G", N * plant.n);
 }
 
+const blw_l1_ops_t *engine(const JsonNode &name)
+{
+    static const std::map<std::string, const blw_l1_ops_t *> known = {
+        {"active_set", &blw_l1_active_set_ops},
+        {"admm", &blw_l1_admm_ops},
+        {"tableau", &blw_l1_tableau_ops},
+    };
+    const auto found = known.find(name.text());
+    if (found == known.end()) {
+        name.fail("unknown engine '" + name.text() + "'");
+    }
+    return found->second;
+}
+
 void load_l1(TableReader tables, blw_l1_model_t &model)
 {
     model.N              = tables.integer<std::uint16_t>("N");
@@ -42,7 +57,7 @@ void load_l1(TableReader tables, blw_l1_model_t &model)
     model.n_groups       = tables.integer<std::uint16_t>("n_groups");
     model.max_iterations = tables.integer<std::uint16_t>("max_iterations");
     model.n              = tables.integer<std::uint8_t>("n");
-    model.engine         = tables.integer<std::uint8_t>("engine");
+    model.engine         = engine(tables.member("engine"));
     const std::size_t N  = model.N;
     model.first          = tables.indices("first", model.n_groups + std::size_t{1U});
     model.Z              = tables.reals_or_null("Z", BLW_L1_Z_LEN(model.N, model.d));

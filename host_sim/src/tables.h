@@ -50,6 +50,11 @@ public:
     {
         return static_cast<T>(node_.member(name).integer(std::numeric_limits<T>::max()));
     }
+    /** A member that is no table. */
+    JsonNode member(const char *name) const
+    {
+        return node_.member(name);
+    }
     /** Present and not null. */
     bool has(const char *name) const
     {

@@ -51,15 +51,10 @@ void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *ou
     blw_la_trapv_t(m->N, m->d, m->Z, v, out);
 }
 
-/* l = S zeta, by the tables there are. */
-static void benign_multipliers(blw_l1_t *self, const blw_real_t *zeta)
+void blw_l1_multiply_Z(blw_l1_t *self, const blw_real_t *zeta)
 {
-    if (self->model->S != NULL) {
-        blw_la_symv(self->model->N, self->model->S, zeta, self->l);
-    } else {
-        blw_l1_project(self->model, zeta, self->z);
-        blw_l1_multipliers(self);
-    }
+    blw_l1_project(self->model, zeta, self->z);
+    blw_l1_multipliers(self);
 }
 
 void blw_l1_multipliers(blw_l1_t *self)
@@ -148,38 +143,6 @@ static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info
     info->bound              = (bound <= BLW_REAL_MAX) ? bound : BLW_REAL_MAX;
 }
 
-/* Take tau on A from the last solve: nu then absorbs what changed, and a group whose nu has turned
- * round or vanished is no candidate any more.  A solve that was cut short has left nothing worth
- * taking: then from nu = 0. */
-static void start(blw_l1_t *self, const blw_real_t *zeta)
-{
-    const blw_l1_model_t *const m = self->model;
-    size_t                      k = 0U;
-
-    if (!self->solved) {
-        blw_l1_support_clear(self, zeta);
-        return;
-    }
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        for (size_t i = m->first[g]; (i < m->first[g + 1U]) && !blw_l1_in_support(self, g); i++) {
-            self->tau[i] = zeta[i];
-        }
-    }
-    while (k < self->n_A) {
-        const size_t     g    = blw_l1_member(self, k);
-        const size_t     i    = m->first[g];
-        const blw_real_t nu   = zeta[i] - self->tau[i];
-        const bool       pair = (blw_l1_size(m, g) == 2U);
-        if ((pair && (blw_l1_aim(self, zeta, g) > BLW_R(0.0)))
-            || (!pair && ((nu * self->dir[i]) > BLW_R(0.0)))) {
-            k++;
-        } else {
-            blw_l1_support_drop(self, zeta, k);
-        }
-    }
-    blw_l1_project(m, self->tau, self->z);
-}
-
 void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
 {
     const size_t N = model->N;
@@ -193,8 +156,7 @@ void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
     self->z     = &self->step[N];
     self->dz    = &self->z[d];
     self->A     = &self->dz[d];
-    self->L     = (model->engine == (uint8_t)BLW_L1_TABLEAU) ? &self->step[N + model->n]
-                                                             : &self->A[model->n_groups];
+    self->L     = (model->Z == NULL) ? &self->step[N + model->n] : &self->A[model->n_groups];
     blw_l1_reset(self);
 }
 
@@ -212,29 +174,21 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     const blw_l1_model_t *const m = self->model;
 
     *info = (blw_l1_info_t){.kalman = false};
-    benign_multipliers(self, zeta);
+    m->engine->multiply(self, zeta);
     info->statistic = blw_l1_statistic(self);
-    if (info->statistic <= BLW_R(1.0)) {
-        info->kalman    = true;
-        info->converged = true;
-        blw_l1_support_clear(self, zeta);
-    } else if (!(info->statistic <= BLW_REAL_MAX)) {
-        blw_l1_support_clear(self, zeta); /* a NaN: nothing can be said of it */
-    } else if (m->engine == (uint8_t)BLW_L1_TABLEAU) {
-        blw_l1_tableau(self, zeta, x_hat, info);
-    } else if (m->engine == (uint8_t)BLW_L1_ADMM) {
-        blw_l1_admm(self, zeta, info);
-    } else {
-        start(self, zeta);
-        blw_l1_active_set(self, zeta, info);
+    if ((info->statistic > BLW_R(1.0)) && (info->statistic <= BLW_REAL_MAX)) {
+        m->engine->solve(self, zeta, x_hat, info);
+    } else { /* the certificate, or a NaN, of which nothing can be said */
+        info->kalman    = (info->statistic <= BLW_R(1.0));
+        info->converged = info->kalman;
+        self->n_A       = 0U;
+        self->rows      = 0U;
+        blw_la_copy(m->N, zeta, self->tau);
+        blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
     }
     self->solved = info->converged;
     if (!info->converged) {
         report_gap(self, zeta, info);
-    }
-    if (info->kalman || (m->engine != (uint8_t)BLW_L1_TABLEAU)
-        || !(info->statistic <= BLW_REAL_MAX)) {
-        blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
     }
 }
 
@@ -268,6 +222,12 @@ blw_real_t blw_l1_excess(const blw_l1_t *self, const blw_real_t *zeta, size_t fi
     return max;
 }
 
+/* Length of a table that some engines do without. */
+static size_t length_of(const blw_real_t *table, size_t length)
+{
+    return (table != NULL) ? length : 0U;
+}
+
 /* Groups of one or two rows that cover 0..N-1 in order. */
 static bool groups_ok(const blw_l1_model_t *m)
 {
@@ -279,15 +239,10 @@ static bool groups_ok(const blw_l1_model_t *m)
     return ok && (m->first[m->n_groups] == m->N);
 }
 
-/* Thresholds and constants are positive; the engine has what it needs. */
+/* Thresholds and constants are positive. */
 static bool numbers_ok(const blw_l1_model_t *m)
 {
-    const bool admm    = (m->engine == (uint8_t)BLW_L1_ADMM);
-    const bool tableau = (m->engine == (uint8_t)BLW_L1_TABLEAU);
-    bool       ok =
-        (m->kappa_G > BLW_R(0.0)) && (m->kappa_W > BLW_R(0.0))
-        && (tableau ? !blw_l1_has_pairs(m)
-                    : (admm ? (m->rho > BLW_R(0.0)) : (m->engine == (uint8_t)BLW_L1_ACTIVE_SET)));
+    bool ok = (m->kappa_G > BLW_R(0.0)) && (m->kappa_W > BLW_R(0.0));
 
     for (size_t g = 0U; ok && (g < m->n_groups); g++) {
         ok = (m->c[g] > BLW_R(0.0));
@@ -298,23 +253,20 @@ static bool numbers_ok(const blw_l1_model_t *m)
 blw_status_t blw_l1_check(const blw_l1_model_t *m, blw_table_check_t *check)
 {
     if ((m == NULL) || (m->d == 0U) || (m->N != (m->d + m->n)) || !groups_ok(m)
-        || (m->max_iterations == 0U)) {
+        || (m->max_iterations == 0U) || (m->engine == NULL) || !m->engine->fits(m)) {
         return BLW_ERR_MODEL;
     }
-    const size_t N    = m->N;
-    const bool   admm = (m->engine == (uint8_t)BLW_L1_ADMM);
+    const size_t N      = m->N;
+    const size_t packed = blw_la_packed_row(N);
 
-    const bool   tableau = (m->engine == (uint8_t)BLW_L1_TABLEAU);
-    const size_t packed  = (N * (N + 1U)) / 2U;
-
-    blw_table_add(check, m->Z, tableau ? 0U : BLW_L1_Z_LEN(N, m->d));
+    blw_table_add(check, m->Z, length_of(m->Z, BLW_L1_Z_LEN(N, m->d)));
     blw_table_add(check, m->F, (size_t)m->n * N);
     blw_table_add(check, m->c, m->n_groups);
-    blw_table_add(check, m->M, admm ? packed : 0U);
-    blw_table_add(check, m->S, tableau ? packed : 0U);
-    blw_table_add(check, m->W, tableau ? packed : 0U);
-    blw_table_add(check, m->G, tableau ? (N * m->n) : 0U);
-    blw_table_add(check, m->P, tableau ? blw_la_packed_row(m->n) : 0U);
+    blw_table_add(check, m->M, length_of(m->M, packed));
+    blw_table_add(check, m->S, length_of(m->S, packed));
+    blw_table_add(check, m->W, length_of(m->W, packed));
+    blw_table_add(check, m->G, length_of(m->G, N * m->n));
+    blw_table_add(check, m->P, length_of(m->P, blw_la_packed_row(m->n)));
     blw_table_add_real(check, m->rho);
     blw_table_add_real(check, m->kappa_G);
     blw_table_add_real(check, m->kappa_W);

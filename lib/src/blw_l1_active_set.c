@@ -286,3 +286,55 @@ void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *in
         before             = full ? residual : BLW_REAL_MAX;
     }
 }
+
+/* Take tau on A from the last solve: nu then absorbs what changed, and a group whose nu has turned
+ * round or vanished is no candidate any more.  A solve that was cut short has left nothing worth
+ * taking: then from nu = 0. */
+static void start(blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m = self->model;
+    size_t                      k = 0U;
+
+    if (!self->solved) {
+        blw_l1_support_clear(self, zeta);
+        return;
+    }
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        for (size_t i = m->first[g]; (i < m->first[g + 1U]) && !blw_l1_in_support(self, g); i++) {
+            self->tau[i] = zeta[i];
+        }
+    }
+    while (k < self->n_A) {
+        const size_t     g    = blw_l1_member(self, k);
+        const size_t     i    = m->first[g];
+        const blw_real_t nu   = zeta[i] - self->tau[i];
+        const bool       pair = (blw_l1_size(m, g) == 2U);
+        if ((pair && (blw_l1_aim(self, zeta, g) > BLW_R(0.0)))
+            || (!pair && ((nu * self->dir[i]) > BLW_R(0.0)))) {
+            k++;
+        } else {
+            blw_l1_support_drop(self, zeta, k);
+        }
+    }
+    blw_l1_project(m, self->tau, self->z);
+}
+
+static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    start(self, zeta);
+    blw_l1_active_set(self, zeta, info);
+    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
+}
+
+static bool fits(const blw_l1_model_t *m)
+{
+    return m->Z != NULL;
+}
+
+const blw_l1_ops_t blw_l1_active_set_ops = {
+    .fits     = fits,
+    .multiply = blw_l1_multiply_Z,
+    .solve    = solve,
+};

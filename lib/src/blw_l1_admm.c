@@ -107,7 +107,7 @@ static void take_support(blw_l1_t *self, const blw_real_t *zeta)
     blw_l1_project(m, self->tau, self->z);
 }
 
-void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
+static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m       = self->model;
     const size_t                reserve = (size_t)RESERVE * m->N;
@@ -121,4 +121,16 @@ void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
     take_support(self, zeta);
     blw_l1_multipliers(self);
     blw_l1_active_set(self, zeta, info);
+    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
 }
+
+static bool fits(const blw_l1_model_t *m)
+{
+    return (m->Z != NULL) && (m->M != NULL) && (m->rho > BLW_R(0.0));
+}
+
+const blw_l1_ops_t blw_l1_admm_ops = {
+    .fits     = fits,
+    .multiply = blw_l1_multiply_Z,
+    .solve    = solve,
+};

@@ -13,6 +13,17 @@
 #define BLW_L1_SLACK_TAU (BLW_R(0.5) * BLW_REAL_EPS)
 #define BLW_L1_LOOSE     BLW_R(16.0)
 
+/* An engine. */
+struct blw_l1_ops {
+    /* Whether the model has what the engine needs. */
+    bool (*fits)(const blw_l1_model_t *model);
+    /* l = S zeta. */
+    void (*multiply)(blw_l1_t *self, const blw_real_t *zeta);
+    /* Where the certificate fails: from l = S zeta and the last solution to l, tau and x [n], the best
+     * that was found. */
+    void (*solve)(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info);
+};
+
 /* Row i of the trapezoid Z and its length. */
 static inline const blw_real_t *blw_l1_row(const blw_l1_model_t *m, size_t i, size_t *len)
 {
@@ -42,6 +53,8 @@ blw_real_t blw_l1_aim(blw_l1_t *self, const blw_real_t *zeta, size_t g);
 void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *out);
 /* l = Z z, all rows. */
 void blw_l1_multipliers(blw_l1_t *self);
+/* z = Z' zeta, l = Z z: .multiply of the engines on Z. */
+void blw_l1_multiply_Z(blw_l1_t *self, const blw_real_t *zeta);
 /* max_g |l_g| / c_g over all groups. */
 blw_real_t blw_l1_statistic(const blw_l1_t *self);
 /* The group outside A that violates |l_g| <= c_g most, by more than widen times the slack, or
@@ -93,10 +106,7 @@ void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h);
  * x [n].  *bound = |last correction of x|.  @return whether they make a minimum. */
 bool blw_l1_kkt(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound);
 
-/* Starts from l = S zeta; writes x [n]. */
-void blw_l1_tableau(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info);
-/* Engines: start from A, dir and tau, leave the best tau found. */
+/* Start from A, dir, tau and z, leave the best tau found. */
 void blw_l1_active_set(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);
-void blw_l1_admm(blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info);
 
 #endif

@@ -314,7 +314,7 @@ static void pivot(blw_l1_t *self, blw_l1_info_t *info)
     }
 }
 
-void blw_l1_tableau(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
+static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m       = self->model;
     bool                        dropped = false;
@@ -338,3 +338,20 @@ void blw_l1_tableau(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l
         blw_la_gemv(m->n, m->N, m->F, self->tau, x);
     }
 }
+
+static void multiply(blw_l1_t *self, const blw_real_t *zeta)
+{
+    blw_la_symv(self->model->N, self->model->S, zeta, self->l);
+}
+
+static bool fits(const blw_l1_model_t *m)
+{
+    return !blw_l1_has_pairs(m) && (m->Z == NULL) && (m->S != NULL) && (m->W != NULL)
+           && (m->G != NULL) && (m->P != NULL);
+}
+
+const blw_l1_ops_t blw_l1_tableau_ops = {
+    .fits     = fits,
+    .multiply = multiply,
+    .solve    = solve,
+};

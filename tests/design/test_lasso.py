@@ -87,7 +87,7 @@ def test_design_given_real_modes_packs_the_identities_of_the_tableau(name):
     _, plant, _, designed = design(name, gamma=1.0)
     tables = designed.tables.to_json()
     fused, N = tables["l1"], tables["l1"]["N"]
-    if fused["engine"] != l1.ENGINE_TABLEAU:
+    if fused["engine"] != l1.TABLEAU.name:
         assert fused["n_groups"] < N
         return
     S, W = symmetric(fused["S"], N), symmetric(fused["W"], N)
@@ -135,8 +135,8 @@ def test_design_given_W_too_ill_conditioned_for_a_small_gamma_says_so():
     assert designed.info["benign_loss"] is None
 
 
-@pytest.mark.parametrize("name, engine, bound", [("paper0", l1.ENGINE_TABLEAU, 4 * 15),
-                                                 ("complex", l1.ENGINE_ACTIVE_SET, 8 * 15)])
+@pytest.mark.parametrize("name, engine, bound", [("paper0", l1.TABLEAU.name, 4 * 15),
+                                                 ("complex", l1.ACTIVE_SET.name, 8 * 15)])
 def test_design_given_auto_takes_the_active_set_with_its_bound(name, engine, bound):
     *_, designed = design(name, gamma=1.0)
     fused = designed.tables.to_json()["l1"]
@@ -159,7 +159,7 @@ def test_design_given_admm_packs_the_inverse_for_the_tuned_penalty():
     M = M + np.tril(M, -1).T
     Z = trapezoid(fused)
     assert np.abs(M @ (Z @ Z.T + fused["rho"] * np.eye(N)) - np.eye(N)).max() < 1e-9
-    assert fused["engine"] == l1.ENGINE_ADMM
+    assert fused["engine"] == l1.ADMM.name
     assert fused["rho"] in admm_tuning.RHOS
     assert designed.info["admm_converged"]
     assert designed.info["max_iterations"] >= designed.info["admm_iterations_simulated"]

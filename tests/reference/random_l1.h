@@ -121,7 +121,7 @@ public:
         return sum;
     }
 
-    blw_l1_model_t model(blw_l1_engine_t engine, int max_iterations) const
+    blw_l1_model_t model(const blw_l1_ops_t *engine, int max_iterations) const
     {
         blw_l1_model_t m{};
         m.N              = static_cast<uint16_t>(N_);
@@ -129,20 +129,20 @@ public:
         m.n_groups       = static_cast<uint16_t>(c_.size());
         m.max_iterations = static_cast<uint16_t>(max_iterations);
         m.n              = static_cast<uint8_t>(n_);
-        m.engine         = static_cast<uint8_t>(engine);
+        m.engine         = engine;
         m.first          = first_.data();
         m.Z              = Z_table_.data();
         m.F              = F_table_.data();
         m.c              = c_table_.data();
-        m.M              = (engine == BLW_L1_ADMM) ? M_table_.data() : nullptr;
-        if (engine == BLW_L1_TABLEAU) {
+        m.M              = (engine == &blw_l1_admm_ops) ? M_table_.data() : nullptr;
+        if (engine == &blw_l1_tableau_ops) {
             m.Z = nullptr;
             m.S = S_table_.data();
             m.W = W_table_.data();
             m.G = G_table_.data();
             m.P = P_table_.data();
         }
-        m.rho     = (engine == BLW_L1_ADMM) ? BLW_R(0.3) : BLW_R(0.0);
+        m.rho     = (engine == &blw_l1_admm_ops) ? BLW_R(0.3) : BLW_R(0.0);
         m.kappa_G = static_cast<blw_real_t>(kappa_G_);
         m.kappa_W = static_cast<blw_real_t>(kappa_W_);
         return m;

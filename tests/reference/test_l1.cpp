@@ -30,7 +30,7 @@ constexpr double tolerance = is_double ? 1e-9 : 3e-3; // relative to thresholds 
 class Solver
 {
 public:
-    Solver(const Problem &problem, blw_l1_engine_t engine, int max_iterations)
+    Solver(const Problem &problem, const blw_l1_ops_t *engine, int max_iterations)
         : model_(problem.model(engine, max_iterations)),
           memory_(BLW_L1_MEM(model_.N, model_.d, model_.n_groups) + GUARD,
                   std::numeric_limits<blw_real_t>::quiet_NaN())
@@ -90,7 +90,7 @@ void check_solution(Problem &problem, Solver &solver, unsigned seed, double atta
 }
 
 // A solve cut short says how far off it may be, and that is true.
-void check_bound(Problem &problem, unsigned seed, blw_l1_engine_t engine)
+void check_bound(Problem &problem, unsigned seed, const blw_l1_ops_t *engine)
 {
     for (int iterations = 1; iterations <= 8; ++iterations) {
         Solver       cut(problem, engine, iterations);
@@ -108,8 +108,9 @@ void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
     for (const double threshold : {0.3, 1.0, 3.0}) {
         Problem    problem(seed, sizes, n, threshold);
         const bool pairs = std::size_t(problem.rows()) != sizes.size();
-        for (const blw_l1_engine_t engine : {BLW_L1_ACTIVE_SET, BLW_L1_ADMM, BLW_L1_TABLEAU}) {
-            if (pairs && (engine == BLW_L1_TABLEAU)) {
+        for (const blw_l1_ops_t *engine :
+             {&blw_l1_active_set_ops, &blw_l1_admm_ops, &blw_l1_tableau_ops}) {
+            if (pairs && (engine == &blw_l1_tableau_ops)) {
                 continue;
             }
             Solver solver(problem, engine, 3000);
@@ -117,9 +118,9 @@ void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
                 check_solution(problem, solver, seed, (k % 3 == 2) ? 100.0 : 2.0 * k);
             }
         }
-        check_bound(problem, seed, BLW_L1_ACTIVE_SET);
+        check_bound(problem, seed, &blw_l1_active_set_ops);
         if (!pairs) {
-            check_bound(problem, seed, BLW_L1_TABLEAU);
+            check_bound(problem, seed, &blw_l1_tableau_ops);
         }
     }
 }
@@ -130,7 +131,7 @@ void check_descent(unsigned seed, const std::vector<int> &sizes, int n)
 {
     for (const double least : {1e-3, 1e-5, 1e-10}) {
         Problem problem(seed, sizes, n, 1e-3, least);
-        Solver  solver(problem, BLW_L1_ACTIVE_SET, 8 * problem.rows());
+        Solver  solver(problem, &blw_l1_active_set_ops, 8 * problem.rows());
         for (int k = 0; k < 40; ++k) {
             const Vector zeta  = rounded(problem.sample((k % 4 == 3) ? 100.0 : 1.0));
             const Vector x     = solver.solve(zeta);
@@ -148,7 +149,7 @@ void check_degenerate(unsigned seed, int sensors, int n)
     for (const double threshold : {0.01, 0.1, 0.5}) {
         Problem problem(seed, std::vector<int>(static_cast<std::size_t>(sensors * n), 1), n, 1.0);
         problem.make_degenerate(threshold);
-        for (const blw_l1_engine_t engine : {BLW_L1_ACTIVE_SET, BLW_L1_ADMM}) {
+        for (const blw_l1_ops_t *engine : {&blw_l1_active_set_ops, &blw_l1_admm_ops}) {
             Solver solver(problem, engine, 1000);
             for (int k = 0; k < 10; ++k) {
                 const Vector x = solver.solve(rounded(problem.sample(k % 3)));

@@ -76,7 +76,7 @@ void support_lasso_make(support_lasso_t *made, blw_method_t method)
                                     .n_groups       = 3U,
                                     .max_iterations = 20U,
                                     .n              = 1U,
-                                    .engine         = (uint8_t)BLW_L1_ACTIVE_SET,
+                                    .engine         = &blw_l1_active_set_ops,
                                     .first          = first,
                                     .Z              = Z,
                                     .F              = K,

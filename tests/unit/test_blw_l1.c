@@ -28,7 +28,7 @@ void tearDown(void) {}
 
 static void use_admm(void)
 {
-    made.l1.engine         = (uint8_t)BLW_L1_ADMM;
+    made.l1.engine         = &blw_l1_admm_ops;
     made.l1.M              = M_half;
     made.l1.rho            = BLW_R(0.5);
     made.l1.max_iterations = 500U;
@@ -180,7 +180,9 @@ static void test_check_given_each_fault_refuses(void)
     ASSERT_REFUSED(made.l1.kappa_G = BLW_R(0.0));
     ASSERT_REFUSED(made.l1.kappa_W = -BLW_R(1.0));
     ASSERT_REFUSED(made.l1.kappa_W = support_inf);
-    ASSERT_REFUSED(made.l1.engine = 3U);
+    ASSERT_REFUSED(made.l1.engine = NULL);
+    ASSERT_REFUSED(made.l1.engine = &blw_l1_tableau_ops);
+    ASSERT_REFUSED(use_admm(); made.l1.Z = NULL);
     ASSERT_REFUSED(use_admm(); made.l1.M = NULL);
     ASSERT_REFUSED(use_admm(); made.l1.rho = BLW_R(0.0));
 }

@@ -14,7 +14,7 @@ from blw import names
 from blw.design import Design, Designed
 from blw.literals import literal
 from blw.model import Model
-from blw.tables import Code, Index, Member, Real, Struct, Table
+from blw.tables import Code, Index, Link, Member, Real, Struct, Table
 
 WIDTH = 100
 INDENT = "    "
@@ -212,6 +212,8 @@ def _value(value: Member, target: str) -> str:
         return target
     if isinstance(value, Real):
         return f"BLW_R({literal(value.value)})"
+    if isinstance(value, Link):
+        return f"&{value.symbol}"
     return f"{int(value)}U" if value >= 0 else str(int(value))
 
 

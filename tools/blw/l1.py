@@ -22,13 +22,13 @@ import scipy.special
 from numpy.typing import NDArray
 
 from blw.errors import DesignError
-from blw.tables import Struct, index, real, table
+from blw.tables import Link, Struct, index, real, table
 
 Array = NDArray[Any]
 
-ENGINE_ACTIVE_SET = 1
-ENGINE_ADMM = 2
-ENGINE_TABLEAU = 3
+ACTIVE_SET = Link("blw_l1_active_set_ops", "active_set")
+ADMM = Link("blw_l1_admm_ops", "admm")
+TABLEAU = Link("blw_l1_tableau_ops", "tableau")
 
 #: Part of a row's information that is redundant; below this it is rounding.
 _NOT_REDUNDANT = 1e-12
@@ -224,7 +224,7 @@ def pack_lower(M: Array) -> Array:
 class Engine:
     """How the problem is solved on the device."""
 
-    code: int
+    link: Link
     max_iterations: int
     rho: float = 0.0
     M: Array | None = None  #: (S + rho I)^-1
@@ -238,7 +238,7 @@ def struct(
     N, d = Z.shape
     c = thresholds(reduced_form, groups, gamma)
     kappa_G, kappa_W = kappas(reduced_form, groups, c)
-    tableau = engine.code == ENGINE_TABLEAU
+    tableau = engine.link is TABLEAU
     packed = "[N(N+1)/2] packed lower"
     scaled_F = F / reduced_form.scale
     M = None if engine.M is None else table(pack_lower(engine.M), "[N(N+1)/2] (S + rho I)^-1")
@@ -251,7 +251,7 @@ def struct(
             "n_groups": groups.count,
             "max_iterations": engine.max_iterations,
             "n": F.shape[0],
-            "engine": engine.code,
+            "engine": engine.link,
             "first": index(groups.first, "[n_groups + 1] first row of each group, then N"),
             "Z": None if tableau else table(pack_trapezoid(Z), f"[{N} x {d}] trapezoid, packed"),
             "F": table(scaled_F, f"[{F.shape[0]} x {N}]"),

@@ -174,8 +174,8 @@ def choose_engine(
     pivots = (8 if paired else 4) * N
     if options.engine != "admm":
         bound = options.max_iterations or pivots
-        code = l1.ENGINE_ACTIVE_SET if paired else l1.ENGINE_TABLEAU
-        return l1.Engine(code, bound), {
+        link = l1.ACTIVE_SET if paired else l1.TABLEAU
+        return l1.Engine(link, bound), {
             "engine": "active_set",
             "max_iterations": bound,
         }
@@ -191,7 +191,7 @@ def choose_engine(
         "admm_converged": tuned.converged,
         "admm_advice": admm_tuning.advice(tuned, N, d),
     }
-    return l1.Engine(l1.ENGINE_ADMM, bound, tuned.rho, (M + M.T) / 2.0), figures
+    return l1.Engine(l1.ADMM, bound, tuned.rho, (M + M.T) / 2.0), figures
 
 
 def jordan_struct(suffix: str, filters: LocalFilters, scale: Array, model: Model) -> Struct:

@@ -63,6 +63,14 @@ class Code:
     comment: str
 
 
+@dataclass(frozen=True, eq=False)
+class Link:
+    """The address of a const object of the library; JSON knows it by its short name."""
+
+    symbol: str
+    name: str
+
+
 def real(x: float) -> Real:
     """A scalar blw_real_t member."""
     return Real(float(_flush(np.asarray(x, dtype=float))))
@@ -86,7 +94,7 @@ def index(array: ArrayLike, comment: str = "", ctype: str = "uint16_t") -> Index
     return Index(values.astype(np.int64), comment, ctype)
 
 
-Member = Union[int, Real, Table, Index, Code, None, "Struct", list["Struct"]]
+Member = Union[int, Real, Table, Index, Code, Link, None, "Struct", list["Struct"]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +150,8 @@ def _member_json(value: Member) -> Any:
         return value.value
     if isinstance(value, (Table, Index)):
         return value.array.ravel().tolist()
+    if isinstance(value, Link):
+        return value.name
     return None if value is None or isinstance(value, Code) else int(value)
 
 

@@ -9,7 +9,7 @@
  *  nu is optimal iff  |l_g| <= c_g  for all g and  l_g = c_g nu_g / |nu_g|  where nu_g /= 0.  (4)
  *
  *  Certificate: if (4) holds for nu = 0, then x_hat is exactly the Kalman estimate ([L] Theorem 3).
- *  Two engines solve the rest.  Both keep tau = zeta - nu, not nu: tau stays at noise size however
+ *  An engine solves the rest.  Each keeps tau = zeta - nu, not nu: tau stays at noise size however
  *  large the attack, so nothing large cancels.
  *
  *  Z is lower trapezoidal, packed by rows: row i has min(i + 1, d) numbers.  Rows of a group are
@@ -22,33 +22,37 @@
 extern "C" {
 #endif
 
-typedef enum blw_l1_engine {
-    BLW_L1_ACTIVE_SET = 1, /**< pivots between supports; Newton steps where groups have two rows */
-    BLW_L1_ADMM       = 2, /**< alternating directions, then the same solve on the support found */
-    BLW_L1_TABLEAU    = 3  /**< groups of one row only: pivots on the tableau of S, verified in W */
-} blw_l1_engine_t;
+/** A way to solve (2).  The model holds its address, so that a firmware links only the one it uses. */
+typedef struct blw_l1_ops blw_l1_ops_t;
+
+/** Pivots between supports; Newton steps where groups have two rows. */
+extern const blw_l1_ops_t blw_l1_active_set_ops;
+/** Alternating directions, then the same solve on the support found. */
+extern const blw_l1_ops_t blw_l1_admm_ops;
+/** Groups of one row only: pivots on the tableau of S, verified in W. */
+extern const blw_l1_ops_t blw_l1_tableau_ops;
 
 typedef struct blw_l1_model {
-    uint16_t          N;              /**< rows of zeta */
-    uint16_t          d;              /**< columns of Z, N - n */
-    uint16_t          n_groups;       /**< groups */
-    uint16_t          max_iterations; /**< bound on pivots or passes in one solve */
-    uint8_t           n;              /**< states */
-    uint8_t           engine;         /**< blw_l1_engine_t */
-    const uint16_t   *first;          /**< [n_groups + 1] first row of each group, then N */
-    const blw_real_t *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
-    const blw_real_t *F;       /**< [n x N] */
-    const blw_real_t *c;       /**< [n_groups] thresholds, > 0 */
-    const blw_real_t *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
+    uint16_t            N;              /**< rows of zeta */
+    uint16_t            d;              /**< columns of Z, N - n */
+    uint16_t            n_groups;       /**< groups */
+    uint16_t            max_iterations; /**< bound on pivots or passes in one solve */
+    uint8_t             n;              /**< states */
+    const blw_l1_ops_t *engine;         /**< one of the above */
+    const uint16_t     *first;          /**< [n_groups + 1] first row of each group, then N */
+    const blw_real_t   *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
+    const blw_real_t   *F;       /**< [n x N] */
+    const blw_real_t   *c;       /**< [n_groups] thresholds, > 0 */
+    const blw_real_t   *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
                                            NULL otherwise */
-    const blw_real_t *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
-    const blw_real_t *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
-    const blw_real_t *G;       /**< tableau: [N x n], or NULL */
-    const blw_real_t *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
-    blw_real_t        rho;     /**< ADMM: penalty, > 0; 0 otherwise */
-    blw_real_t        kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
+    const blw_real_t   *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
+    const blw_real_t   *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
+    const blw_real_t   *G;       /**< tableau: [N x n], or NULL */
+    const blw_real_t   *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
+    blw_real_t          rho;     /**< ADMM: penalty, > 0; 0 otherwise */
+    blw_real_t          kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
                                            least |x| / kappa_G */
-    blw_real_t        kappa_W; /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
+    blw_real_t          kappa_W; /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
 } blw_l1_model_t;
 
 /** Solver state: the support A found last, from which the next solve starts. */
@@ -98,7 +102,7 @@ typedef struct blw_l1_info {
     ((BLW_L1_MEM_Z(N, d, n_groups) > BLW_L1_MEM_TABLEAU(N, d)) ? BLW_L1_MEM_Z(N, d, n_groups) \
                                                                : BLW_L1_MEM_TABLEAU(N, d))
 
-/** Add the tables to a walk and check dimensions, groups, signs and the engine. */
+/** Add the tables to a walk and check dimensions, groups, signs and what the engine needs. */
 blw_status_t blw_l1_check(const blw_l1_model_t *model, blw_table_check_t *check);
 /** Bind a checked model and BLW_L1_MEM numbers of memory, reset. */
 void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem);
