@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_bank.h"
 #include "blw_bank_internal.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 #include "blw_step.h"
 
-static size_t mem_len_of(const blw_bank_model_t *model)
+static BLW_COLD size_t mem_len_of(const blw_bank_model_t *model)
 {
     const blw_plant_t *const plant    = model->head.plant;
     const size_t             averages = (size_t)model->sets * model->per_set * model->groups;
@@ -37,8 +38,8 @@ static void bind(blw_bank_t *self, const blw_bank_model_t *model, blw_real_t *me
     self->suspicion = blw_la_take(&mem, m);
 }
 
-blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model, blw_real_t *mem,
-                           size_t mem_len)
+BLW_COLD blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model,
+                                    blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -54,7 +55,7 @@ blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model, blw_
     return blw_bank_reset(self, NULL);
 }
 
-blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0)
+BLW_COLD blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0)
 {
     if (self == NULL) {
         return BLW_ERR_ARG;
@@ -316,7 +317,7 @@ blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real
 }
 
 /* The adapters rely on the base, and the head, being the first member (deviation D-1). */
-static size_t ops_mem_len(const blw_model_t *model)
+static BLW_COLD size_t ops_mem_len(const blw_model_t *model)
 {
     if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_BANK) || (model->plant == NULL)) {
         return 0U;
@@ -324,20 +325,21 @@ static size_t ops_mem_len(const blw_model_t *model)
     return mem_len_of((const blw_bank_model_t *)(const void *)model);
 }
 
-static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+static BLW_COLD blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     return blw_bank_init((blw_bank_t *)(void *)self, (const blw_bank_model_t *)(const void *)model,
                          mem, mem_len);
 }
 
-static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+static BLW_COLD blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
     return blw_bank_reset((blw_bank_t *)(void *)self, x0);
 }
 
-static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *y, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_bank_step((blw_bank_t *)(void *)self, u, y, valid, out);
 }

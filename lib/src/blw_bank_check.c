@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw_bank_internal.h"
+#include "blw_cold.h"
 
 static bool sizes_ok(const blw_bank_model_t *model)
 {
@@ -78,7 +79,7 @@ static size_t sensors_in_all(const uint16_t *masks, size_t count)
     return sum;
 }
 
-blw_status_t blw_bank_check(const blw_bank_model_t *model)
+BLW_COLD blw_status_t blw_bank_check(const blw_bank_model_t *model)
 {
     blw_table_check_t  check;
     const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_BANK, &check);

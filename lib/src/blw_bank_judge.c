@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw_bank_internal.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 
-void blw_bank_judge_reset(blw_bank_t *self)
+BLW_COLD void blw_bank_judge_reset(blw_bank_t *self)
 {
     const blw_bank_model_t *const model = self->model;
     const size_t                  pairs = (size_t)model->sets * model->per_set;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_chi2.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 
 static bool thresholds_ok(const blw_chi2_model_t *model, size_t rate)
@@ -37,8 +38,8 @@ static bool model_ok(const blw_chi2_model_t *model)
     return check.ok && (check.crc == model->crc);
 }
 
-blw_status_t blw_chi2_init(blw_chi2_t *self, const blw_chi2_model_t *model, blw_real_t *mem,
-                           size_t mem_len)
+BLW_COLD blw_status_t blw_chi2_init(blw_chi2_t *self, const blw_chi2_model_t *model,
+                                    blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;

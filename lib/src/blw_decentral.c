@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_decentral.h"
+#include "blw_cold.h"
 #include "blw_decentral_internal.h"
 #include "blw_la.h"
 #include "blw_step.h"
@@ -10,7 +11,7 @@
 /* Steps in a row without suspicion after which excluded sensors seem to tell the truth. */
 #define CALM_STEPS 4U
 
-static size_t mem_len_of(const blw_decentral_model_t *model)
+static BLW_COLD size_t mem_len_of(const blw_decentral_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
 
@@ -40,8 +41,8 @@ static void bind(blw_decentral_t *self, blw_real_t *mem)
     self->X         = steady ? NULL : blw_la_take(&mem, mu * (mu + n + m));
 }
 
-blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model_t *model,
-                                blw_real_t *mem, size_t mem_len)
+BLW_COLD blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model_t *model,
+                                         blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -59,7 +60,7 @@ blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model
     return blw_decentral_reset(self, NULL);
 }
 
-blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_t *x0)
+BLW_COLD blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_t *x0)
 {
     if (self == NULL) {
         return BLW_ERR_ARG;
@@ -319,7 +320,7 @@ blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, cons
     return BLW_OK;
 }
 
-static size_t ops_mem_len(const blw_model_t *model)
+static BLW_COLD size_t ops_mem_len(const blw_model_t *model)
 {
     if ((model == NULL) || (model->plant == NULL)
         || (model->method != (uint8_t)BLW_METHOD_DECENTRAL)) {
@@ -328,20 +329,21 @@ static size_t ops_mem_len(const blw_model_t *model)
     return mem_len_of((const blw_decentral_model_t *)(const void *)model);
 }
 
-static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+static BLW_COLD blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     return blw_decentral_init((blw_decentral_t *)(void *)self,
                               (const blw_decentral_model_t *)(const void *)model, mem, mem_len);
 }
 
-static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+static BLW_COLD blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
     return blw_decentral_reset((blw_decentral_t *)(void *)self, x0);
 }
 
-static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *y, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_decentral_step((blw_decentral_t *)(void *)self, u, y, valid, out);
 }

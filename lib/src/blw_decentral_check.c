@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What init() checks before it trusts a model. */
+#include "blw_cold.h"
 #include "blw_decentral_internal.h"
 #include "blw_la.h"
 
@@ -206,7 +207,7 @@ static void add_recursive(const blw_decentral_model_t *model, blw_table_check_t 
     }
 }
 
-blw_status_t blw_decentral_check(const blw_decentral_model_t *model)
+BLW_COLD blw_status_t blw_decentral_check(const blw_decentral_model_t *model)
 {
     blw_table_check_t  check;
     const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_DECENTRAL, &check);

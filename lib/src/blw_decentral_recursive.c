@@ -9,6 +9,7 @@
  * (3) by Householder reflections of the columns.  Fusion: the least-squares problem
  * min |L^-1 (z - E_e a - Phi dx)| over an unknown offset a of the excluded rows and dx, again by
  * Householder reflections; its residual is g_J. */
+#include "blw_cold.h"
 #include "blw_decentral_internal.h"
 #include "blw_la.h"
 
@@ -73,7 +74,7 @@ static bool invertible(const blw_decentral_t *self)
     return true;
 }
 
-void blw_decentral_recursive_reset(blw_decentral_t *self)
+BLW_COLD void blw_decentral_recursive_reset(blw_decentral_t *self)
 {
     const size_t mu    = self->model->mu;
     const size_t n     = self->model->head.plant->n;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: MIT */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -64,7 +65,7 @@ static bool values_ok(const blw_guard_model_t *model)
            && (model->sigma >= zero);
 }
 
-static void add_tables(const blw_guard_model_t *model, blw_table_check_t *check)
+static BLW_COLD void add_tables(const blw_guard_model_t *model, blw_table_check_t *check)
 {
     const size_t n   = model->head.plant->n;
     const size_t m   = model->head.plant->m;
@@ -94,7 +95,7 @@ static void add_tables(const blw_guard_model_t *model, blw_table_check_t *check)
     blw_table_add_real(check, model->sigma);
 }
 
-blw_status_t blw_guard_check(const blw_guard_model_t *model)
+BLW_COLD blw_status_t blw_guard_check(const blw_guard_model_t *model)
 {
     blw_table_check_t  check;
     const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_GUARD, &check);

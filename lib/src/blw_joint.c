@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_joint.h"
+#include "blw_cold.h"
 #include "blw_joint_internal.h"
 #include "blw_la.h"
 #include "blw_step.h"
 
-static size_t mem_len_of(const blw_joint_model_t *model)
+static BLW_COLD size_t mem_len_of(const blw_joint_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
 
@@ -35,8 +36,8 @@ static void bind(blw_joint_t *self, blw_real_t *mem)
     self->e         = own ? blw_la_take(&mem, m) : NULL;
 }
 
-blw_status_t blw_joint_init(blw_joint_t *self, const blw_joint_model_t *model, blw_real_t *mem,
-                            size_t mem_len)
+BLW_COLD blw_status_t blw_joint_init(blw_joint_t *self, const blw_joint_model_t *model,
+                                     blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -81,7 +82,7 @@ static blw_mask_t strong_of(const blw_joint_model_t *model)
     return strong;
 }
 
-blw_status_t blw_joint_reset(blw_joint_t *self, const blw_real_t *x0)
+BLW_COLD blw_status_t blw_joint_reset(blw_joint_t *self, const blw_real_t *x0)
 {
     if (self == NULL) {
         return BLW_ERR_ARG;
@@ -288,7 +289,7 @@ blw_status_t blw_joint_set_plant(blw_joint_t *self, const blw_real_t *A, const b
     return BLW_OK;
 }
 
-static size_t ops_mem_len(const blw_model_t *model)
+static BLW_COLD size_t ops_mem_len(const blw_model_t *model)
 {
     if ((model == NULL) || (model->plant == NULL) || (model->method != (uint8_t)BLW_METHOD_JOINT)) {
         return 0U;
@@ -296,20 +297,21 @@ static size_t ops_mem_len(const blw_model_t *model)
     return mem_len_of((const blw_joint_model_t *)(const void *)model);
 }
 
-static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+static BLW_COLD blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     return blw_joint_init((blw_joint_t *)(void *)self,
                           (const blw_joint_model_t *)(const void *)model, mem, mem_len);
 }
 
-static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+static BLW_COLD blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
     return blw_joint_reset((blw_joint_t *)(void *)self, x0);
 }
 
-static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *y, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_joint_step((blw_joint_t *)(void *)self, u, y, valid, out);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What init() demands of a model, so that a step need not. */
+#include "blw_cold.h"
 #include "blw_joint_internal.h"
 #include "blw_la.h"
 
@@ -91,7 +92,7 @@ static bool recursive_ok(const blw_joint_model_t *model, blw_table_check_t *chec
     return all_above(gains->theta_sd, model->r, BLW_R(0.0));
 }
 
-blw_status_t blw_joint_check(const blw_joint_model_t *model)
+BLW_COLD blw_status_t blw_joint_check(const blw_joint_model_t *model)
 {
     blw_table_check_t  check;
     const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_JOINT, &check);

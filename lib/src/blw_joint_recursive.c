@@ -17,6 +17,7 @@
  * The fusion works alike: differences of local estimates are free to be added to x_ref, and so they
  * are projected out of its rows.  All operations on estimates are the same combinations of
  * differences, so the weights sum to I whatever the covariances. */
+#include "blw_cold.h"
 #include "blw_joint_internal.h"
 #include "blw_la.h"
 
@@ -45,7 +46,7 @@ static columns_t columns_of(const blw_joint_t *self)
     return at;
 }
 
-void blw_joint_recursive_reset(blw_joint_t *self)
+BLW_COLD void blw_joint_recursive_reset(blw_joint_t *self)
 {
     const size_t n    = self->plant.n;
     const size_t rows = BLW_JOINT_ROWS(n, self->model->r);

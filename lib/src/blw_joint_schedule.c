@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Precomputed gains and weights. */
+#include "blw_cold.h"
 #include "blw_joint_internal.h"
 #include "blw_la.h"
 
-void blw_joint_schedule_reset(blw_joint_t *self)
+BLW_COLD void blw_joint_schedule_reset(blw_joint_t *self)
 {
     blw_la_copy(self->model->r, self->model->schedule->sd_gap, self->sd);
 }

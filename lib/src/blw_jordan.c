@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_jordan.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 
 /* The step never reads beyond zeta_i whatever J says; an entry that points there is a sign of
@@ -15,8 +16,8 @@ static bool edges_ok(const blw_jordan_model_t *model)
            && !(blw_la_abs(model->Jm[0]) > BLW_R(0.0));
 }
 
-blw_status_t blw_jordan_check(const blw_jordan_model_t *model, const blw_plant_t *plant,
-                              blw_table_check_t *check)
+BLW_COLD blw_status_t blw_jordan_check(const blw_jordan_model_t *model, const blw_plant_t *plant,
+                                       blw_table_check_t *check)
 {
     if ((model == NULL) || (plant == NULL) || (check == NULL)) {
         return BLW_ERR_ARG;
@@ -36,8 +37,8 @@ blw_status_t blw_jordan_check(const blw_jordan_model_t *model, const blw_plant_t
     return (check->ok && edges_ok(model)) ? BLW_OK : BLW_ERR_MODEL;
 }
 
-void blw_jordan_reset(const blw_jordan_model_t *model, size_t n, const blw_real_t *x0,
-                      blw_real_t *zeta)
+BLW_COLD void blw_jordan_reset(const blw_jordan_model_t *model, size_t n, const blw_real_t *x0,
+                               blw_real_t *zeta)
 {
     blw_la_gemv((size_t)model->m * model->r, n, model->G, x0, zeta);
 }

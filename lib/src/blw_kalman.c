@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_kalman.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 #include "blw_step.h"
 
-static blw_status_t check_model(const blw_kalman_model_t *model)
+static BLW_COLD blw_status_t check_model(const blw_kalman_model_t *model)
 {
     blw_table_check_t  check;
     const blw_status_t status = blw_model_begin(&model->head, BLW_METHOD_KALMAN, &check);
@@ -16,8 +17,8 @@ static blw_status_t check_model(const blw_kalman_model_t *model)
     return blw_model_end(&model->head, &check);
 }
 
-blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+BLW_COLD blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -40,7 +41,7 @@ blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model
     return blw_kalman_reset(self, NULL);
 }
 
-blw_status_t blw_kalman_reset(blw_kalman_t *self, const blw_real_t *x0)
+BLW_COLD blw_status_t blw_kalman_reset(blw_kalman_t *self, const blw_real_t *x0)
 {
     if (self == NULL) {
         return BLW_ERR_ARG;
@@ -146,7 +147,7 @@ blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_
 }
 
 /* The four adapters rely on the base, and the head, being the first member (deviation D-1). */
-static size_t ops_mem_len(const blw_model_t *model)
+static BLW_COLD size_t ops_mem_len(const blw_model_t *model)
 {
     if ((model == NULL) || (model->method != (uint8_t)BLW_METHOD_KALMAN)
         || (model->plant == NULL)) {
@@ -155,20 +156,21 @@ static size_t ops_mem_len(const blw_model_t *model)
     return BLW_KALMAN_MEM(model->plant->n, model->plant->m);
 }
 
-static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+static BLW_COLD blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     return blw_kalman_init((blw_kalman_t *)(void *)self,
                            (const blw_kalman_model_t *)(const void *)model, mem, mem_len);
 }
 
-static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+static BLW_COLD blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
     return blw_kalman_reset((blw_kalman_t *)(void *)self, x0);
 }
 
-static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *y, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_kalman_step((blw_kalman_t *)(void *)self, u, y, valid, out);
 }

@@ -8,6 +8,7 @@
  * so with the two constants of the model
  *     |x* - x| <= kappa_G (sum_g c_g (|nu_g| + |nu*_g|) + kappa_W e).                        (6)
  * (6) holds always and is coarse under a large attack; a verified optimum gives a sharp bound. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 bool blw_l1_has_pairs(const blw_l1_model_t *m)
@@ -143,7 +144,7 @@ static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info
     info->bound              = (bound <= BLW_REAL_MAX) ? bound : BLW_REAL_MAX;
 }
 
-void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
+BLW_COLD void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
 {
     const size_t N = model->N;
     const size_t d = model->d;
@@ -160,7 +161,7 @@ void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
     blw_l1_reset(self);
 }
 
-void blw_l1_reset(blw_l1_t *self)
+BLW_COLD void blw_l1_reset(blw_l1_t *self)
 {
     blw_la_fill(self->model->N, BLW_R(0.0), self->tau);
     blw_la_fill(self->model->N, BLW_R(0.0), self->dir);
@@ -250,7 +251,7 @@ static bool numbers_ok(const blw_l1_model_t *m)
     return ok;
 }
 
-blw_status_t blw_l1_check(const blw_l1_model_t *m, blw_table_check_t *check)
+BLW_COLD blw_status_t blw_l1_check(const blw_l1_model_t *m, blw_table_check_t *check)
 {
     if ((m == NULL) || (m->d == 0U) || (m->N != (m->d + m->n)) || !groups_ok(m)
         || (m->max_iterations == 0U) || (m->engine == NULL) || !m->engine->fits(m)) {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_lasso.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 #include "blw_lasso_internal.h"
 #include "blw_step.h"
@@ -22,7 +23,7 @@ static bool sizes_ok(const blw_lasso_model_t *model)
            && (model->ambiguous <= 1U);
 }
 
-blw_status_t blw_lasso_check(const blw_lasso_model_t *model)
+BLW_COLD blw_status_t blw_lasso_check(const blw_lasso_model_t *model)
 {
     blw_table_check_t check;
     blw_status_t      status = BLW_ERR_MODEL;
@@ -48,7 +49,7 @@ blw_status_t blw_lasso_check(const blw_lasso_model_t *model)
     return blw_model_end(&model->head, &check);
 }
 
-static size_t mem_len_of(const blw_lasso_model_t *model)
+static BLW_COLD size_t mem_len_of(const blw_lasso_model_t *model)
 {
     const blw_plant_t *const    plant = model->head.plant;
     const blw_l1_model_t *const l1    = model->l1;
@@ -57,8 +58,8 @@ static size_t mem_len_of(const blw_lasso_model_t *model)
                          (model->P != NULL) ? 1U : 0U);
 }
 
-blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, blw_real_t *mem,
-                            size_t mem_len)
+BLW_COLD blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model,
+                                     blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -86,7 +87,7 @@ blw_status_t blw_lasso_init(blw_lasso_t *self, const blw_lasso_model_t *model, b
     return blw_lasso_reset(self, NULL);
 }
 
-blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0)
+BLW_COLD blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0)
 {
     if (self == NULL) {
         return BLW_ERR_ARG;
@@ -260,7 +261,7 @@ blw_status_t blw_lasso_fuse(blw_lasso_t *self, const blw_real_t *u, const blw_re
     return BLW_OK;
 }
 
-static size_t ops_mem_len(const blw_model_t *model)
+static BLW_COLD size_t ops_mem_len(const blw_model_t *model)
 {
     const blw_lasso_model_t *const lasso = (const blw_lasso_model_t *)(const void *)model;
 
@@ -272,26 +273,28 @@ static size_t ops_mem_len(const blw_model_t *model)
     return (lasso->l1 != NULL) ? mem_len_of(lasso) : 0U;
 }
 
-static blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model, blw_real_t *mem,
-                             size_t mem_len)
+static BLW_COLD blw_status_t ops_init(blw_estimator_t *self, const blw_model_t *model,
+                                      blw_real_t *mem, size_t mem_len)
 {
     return blw_lasso_init((blw_lasso_t *)(void *)self,
                           (const blw_lasso_model_t *)(const void *)model, mem, mem_len);
 }
 
-static blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
+static BLW_COLD blw_status_t ops_reset(blw_estimator_t *self, const blw_real_t *x0)
 {
     return blw_lasso_reset((blw_lasso_t *)(void *)self, x0);
 }
 
-static blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_step(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *y, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_lasso_step((blw_lasso_t *)(void *)self, u, y, valid, out);
 }
 
-static blw_status_t ops_fuse(blw_estimator_t *self, const blw_real_t *u, const blw_real_t *zeta,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+static BLW_COLD blw_status_t ops_fuse(blw_estimator_t *self, const blw_real_t *u,
+                                      const blw_real_t *zeta, blw_mask_t valid,
+                                      blw_estimator_out_t *out)
 {
     return blw_lasso_fuse((blw_lasso_t *)(void *)self, u, zeta, valid, out);
 }
@@ -305,8 +308,8 @@ const blw_estimator_ops_t blw_lasso_ops = {
     .step       = ops_step,
 };
 
-static blw_status_t ops_init_fusion(blw_estimator_t *self, const blw_model_t *model,
-                                    blw_real_t *mem, size_t mem_len)
+static BLW_COLD blw_status_t ops_init_fusion(blw_estimator_t *self, const blw_model_t *model,
+                                             blw_real_t *mem, size_t mem_len)
 {
     const blw_status_t status = ops_init(self, model, mem, mem_len);
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_local.h"
+#include "blw_cold.h"
 #include "blw_la.h"
 #include "blw_lasso_internal.h"
 
-blw_status_t blw_local_init(blw_local_t *self, const blw_lasso_model_t *model, uint8_t sensor,
-                            blw_real_t *mem, size_t mem_len)
+BLW_COLD blw_status_t blw_local_init(blw_local_t *self, const blw_lasso_model_t *model,
+                                     uint8_t sensor, blw_real_t *mem, size_t mem_len)
 {
     if ((self == NULL) || (model == NULL) || (mem == NULL)) {
         return BLW_ERR_ARG;
@@ -30,7 +31,7 @@ blw_status_t blw_local_init(blw_local_t *self, const blw_lasso_model_t *model, u
     return blw_local_reset(self, NULL);
 }
 
-blw_status_t blw_local_reset(blw_local_t *self, const blw_real_t *x_hat)
+BLW_COLD blw_status_t blw_local_reset(blw_local_t *self, const blw_real_t *x_hat)
 {
     const blw_plant_t *const plant = self->model->head.plant;
     const blw_real_t *const  start = (x_hat != NULL) ? x_hat : plant->x0;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw/blw_model.h"
 #include <string.h>
+#include "blw_cold.h"
 #include "blw_la.h"
 
 #ifdef BLW_REAL_DOUBLE
@@ -31,13 +32,13 @@ static uint32_t crc_real(uint32_t crc, blw_real_t value)
     return ~crc;
 }
 
-void blw_table_begin(blw_table_check_t *check)
+BLW_COLD void blw_table_begin(blw_table_check_t *check)
 {
     check->crc = 0U;
     check->ok  = true;
 }
 
-void blw_table_add(blw_table_check_t *check, const blw_real_t *table, size_t len)
+BLW_COLD void blw_table_add(blw_table_check_t *check, const blw_real_t *table, size_t len)
 {
     if (len == 0U) {
         return;
@@ -51,7 +52,7 @@ void blw_table_add(blw_table_check_t *check, const blw_real_t *table, size_t len
     }
 }
 
-void blw_table_add_real(blw_table_check_t *check, blw_real_t value)
+BLW_COLD void blw_table_add_real(blw_table_check_t *check, blw_real_t value)
 {
     blw_table_add(check, &value, 1U);
 }
@@ -72,8 +73,8 @@ static bool ranges_ok(const blw_plant_t *plant)
     return true;
 }
 
-blw_status_t blw_model_begin(const blw_model_t *model, blw_method_t method,
-                             blw_table_check_t *check)
+BLW_COLD blw_status_t blw_model_begin(const blw_model_t *model, blw_method_t method,
+                                      blw_table_check_t *check)
 {
     if ((model == NULL) || (check == NULL)) {
         return BLW_ERR_ARG;
@@ -99,7 +100,7 @@ blw_status_t blw_model_begin(const blw_model_t *model, blw_method_t method,
     return BLW_OK;
 }
 
-blw_status_t blw_model_end(const blw_model_t *model, const blw_table_check_t *check)
+BLW_COLD blw_status_t blw_model_end(const blw_model_t *model, const blw_table_check_t *check)
 {
     return (check->ok && (check->crc == model->crc)) ? BLW_OK : BLW_ERR_MODEL;
 }
