@@ -18,12 +18,17 @@ MODELS = ROOT / "host_sim/models"
 SHARED = Path(os.environ.get("BULWARK_SHARED", ROOT.parent / "shared"))
 
 
-def load(name: str) -> tuple[dict[str, Any], Model, Kalman]:
-    """A golden file, its model, and the Kalman filter designed for it; skips if it is missing."""
+def read(name: str) -> dict[str, Any]:
+    """A golden file; skips if it is missing."""
     path = SHARED / "golden" / f"{name}.json"
     if not path.is_file():
         pytest.skip(f"no {path}: set BULWARK_SHARED")
-    data = json.loads(path.read_text())
+    return json.loads(path.read_text())
+
+
+def load(name: str) -> tuple[dict[str, Any], Model, Kalman]:
+    """A golden file, its model, and the Kalman filter designed for it; skips if it is missing."""
+    data = read(name)
     plant = {key: data["model"][key] for key in ("A", "Bu", "B", "C", "Q", "R")}
     return data, *build(name, plant)
 

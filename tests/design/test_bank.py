@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Method `bank`: design against the reference, and the C library against both."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from bank_library import BankLibrary, compile_library
 from c_library import DEGRADED, MISSING
-from golden import MODELS, SHARED
+from golden import MODELS, read
 from scipy.signal import lfilter
 
 from blw import bank, bank_build
@@ -31,10 +30,7 @@ def libraries(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reference():
-    path = SHARED / "golden" / "bank_drone5.json"
-    if not path.is_file():
-        pytest.skip(f"no {path}: set BULWARK_SHARED")
-    return json.loads(path.read_text())
+    return read("bank_drone5")
 
 
 def named(name):

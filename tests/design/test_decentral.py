@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """`decentral`: tables against [D] without shortcuts, through the C library in both widths."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from c_library import BLIND, CONVERGED, DEGRADED, HELD, KALMAN, MISSING, WARMING_UP
 from decentral_library import Decentral, compile_library
 from decentral_reference import Reference, parse, random_plant, simulate
-from golden import MODELS, SHARED
+from golden import MODELS, read
 from scipy import stats
 
 from blw import decentral, kalman, model
@@ -43,10 +42,7 @@ def reference_run(reference, y, u):
 
 @pytest.mark.parametrize("name", ["drone5", "torsion"])
 def test_run_given_golden_file_agrees_in_both_widths(libraries, name):
-    path = SHARED / "golden" / f"chi2_{name}.json"
-    if not path.is_file():
-        pytest.skip(f"no {path}: set BULWARK_SHARED")
-    data = json.loads(path.read_text())
+    data = read(f"chi2_{name}")
     plant, filtered = shipped(name)
     designed = decentral.design(plant, filtered, Options(false_alarm=data["delta"]))
     y, x, g = (np.array(data[key]) for key in ("y", "xhat", "g"))

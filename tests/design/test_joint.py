@@ -2,11 +2,10 @@
 """The recursions of [J], the tables of `joint`, and what the tool says about them."""
 
 import dataclasses
-import json
 
 import numpy as np
 import pytest
-from golden import MODELS, SHARED
+from golden import MODELS, read
 
 from blw import joint, joint_analysis, kalman, options
 from blw import model as models
@@ -17,10 +16,7 @@ RELATIVE = 1e-9
 
 
 def golden():
-    path = SHARED / "golden" / "fdi_ieee4.json"
-    if not path.is_file():
-        pytest.skip(f"no {path}: set BULWARK_SHARED")
-    data = json.loads(path.read_text())
+    data = read("fdi_ieee4")
     plant = {key: data["system"][key] for key in ("A", "C", "Q", "R", "P0")}
     made = models.parse({"name": "ieee4", "dt_s": 5.0, "plant": plant, "attack": {"p": 1}}, "ieee4")
     pairs = [Pair(one["weak"], tuple(one["strong"])) for one in data["locals"]]

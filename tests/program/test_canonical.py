@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import test_golden
+from golden_case import build, estimates, load, replay
 
 from blw import canonical, kalman
 from blw.design import Design, plant_tables
@@ -32,7 +32,7 @@ def reference_transforms(reference: dict, form: JordanForm) -> np.ndarray:
 def design(golden: dict, gamma: str) -> tuple[Design, np.ndarray, np.ndarray]:
     """The design in the golden file's choice of noise rows; that choice and ours, [m x n x n]."""
     reference = golden["canonical"]
-    model = test_golden.build(golden, {})
+    model = build(golden, "lasso", {})
     gains = kalman.steady_state(model.A, model.C, model.W, model.R)
     modes, filters = modes_of(model.A, model.C), local_filters(model, gains)
     P = reference_transforms(reference, filters.form)
@@ -49,12 +49,12 @@ def design(golden: dict, gamma: str) -> tuple[Design, np.ndarray, np.ndarray]:
 def test_replay_given_golden_measurements_reproduces_reference(
     tmp_path: Path, name: str, gamma: str, precision: str
 ) -> None:
-    golden = test_golden.load(name)
+    golden = load(name)
     whole, *_ = design(golden, gamma)
-    rows = test_golden.replay(tmp_path, golden, whole, precision, "canonical")
+    rows = replay(tmp_path, golden, whole, precision, "canonical")
     reference = golden["canonical"]["gamma"][gamma]
     sigma = np.sqrt(np.diag(golden["kalman"]["P"]))
-    error = np.abs(test_golden.estimates(golden, rows) - reference["x"]) / sigma
+    error = np.abs(estimates(golden, rows) - reference["x"]) / sigma
     assert error[np.array(reference["unique"])].max() < TOLERANCE[precision]
     if precision == "f64":
         assert [row["status"] == "kalman" for row in rows] == reference["certificate"]
@@ -62,7 +62,7 @@ def test_replay_given_golden_measurements_reproduces_reference(
 
 @pytest.mark.parametrize("name", ["paper1", "jordanA"])
 def test_transforms_given_golden_model_differ_by_a_rotation_of_noise_rows(name: str) -> None:
-    golden = test_golden.load(name)
+    golden = load(name)
     _, reference, ours = design(golden, "1")
     H = np.array(golden["canonical"]["H"]).reshape(reference.shape)
     for P_ref, P_our, H_i in zip(reference, ours, H):
