@@ -3,8 +3,9 @@
 
 Routines of the compiler's library have no such graph; theirs is read off the disassembly, where the
 sum over all of a routine's pushes is an upper bound.  A call through a pointer may go to any
-function of the model that the linker kept: its straight-line kernels.  Recursion and a frame of
-unknown size are errors, not guesses.
+straight-line kernel of the model that the linker kept, and to any function of the const objects
+<name>_ops in which modules offer themselves to each other; not back to where it comes from, since
+the library has no recursion.  A frame of unknown size is an error, not a guess, and so is recursion.
 """
 
 import re
@@ -14,6 +15,7 @@ from pathlib import Path
 
 from blw.build import BUILD, StepFailed
 from blw.cost.programs import Program
+from blw.cost.sizes import linked_objects
 
 #: How gcc names what a pointer points to.
 _POINTER = "__indirect_call"
@@ -23,6 +25,8 @@ _FRAME = re.compile(r"(\d+) bytes \((static|dynamic,bounded)\)")
 _FUNCTION = re.compile(r"^([0-9a-f]+) <(\w+)>:\n((?:.+\n)*)", re.MULTILINE)
 _PUSH = re.compile(r"\t(?:v?push|stmdb\tsp!,|str.*\[sp, #-).*")
 _RESERVE = re.compile(r"\t(?:sub(?:\.w)?\tsp,(?: sp,)? #|addi\tsp,sp,-)(\d+)")
+_OPS = re.compile(r"^([0-9a-f]+) ([0-9a-f]+) [rRtT] (blw_\w+_ops)$", re.MULTILINE)
+_DUMP = re.compile(r"^ [0-9a-f]+ ((?:[0-9a-f]+ )+) ", re.MULTILINE)
 _CALL = re.compile(r"\t(?:b|bl|b\.w|b\.n|j|jal|jalr)\t\S*?[0-9a-f]+(?:\(ra\))? <(\w+)>")
 
 
@@ -39,20 +43,25 @@ class CallGraph:
             raise StepFailed(f"recursion: {' -> '.join((*path, root))}")
         if root not in self.frames:
             raise StepFailed(f"the stack of {root} is not known")
-        below = (self.deepest(callee, (*path, root)) for callee in self.calls.get(root, ()))
+        callees = self.calls.get(root, set())
+        if root == _POINTER:
+            callees = callees.difference(path)
+            path = tuple(step for step in path if step != _POINTER)
+        below = (self.deepest(callee, (*path, root)) for callee in callees)
         return self.frames[root] + max(below, default=0)
 
 
 def stack_bytes(program: Program, owner: str) -> int:
     """The most that init, reset and step of the module `owner` need."""
-    symbols = _said(program, "nm")
+    symbols = _said(program, "nm", "-S")
     graph = CallGraph()
     replays = BUILD / program.preset / "port" / "replay" / "CMakeFiles"
     kernels = _add_compiled(graph, replays / f"blw_model_{program.model}.dir")
-    _add_compiled(graph, BUILD / program.preset / "lib" / "CMakeFiles" / "blw.dir")
+    library = _add_compiled(graph, BUILD / program.preset / "lib" / "CMakeFiles" / "blw.dir")
     linked = {line.split()[-1] for line in symbols.splitlines()}
     graph.frames[_POINTER] = 0
     graph.calls[_POINTER] = {name for name in kernels if name.rpartition(":")[2] in linked}
+    graph.calls[_POINTER] |= _offered(program, symbols, library, f"blw_{owner}_ops")
     _add_library(graph, _said(program, "objdump", "-d"), symbols)
     return max(graph.deepest(f"blw_{owner}_{verb}") for verb in ("init", "reset", "step"))
 
@@ -72,13 +81,38 @@ def _add_compiled(graph: CallGraph, folder: Path) -> set[str]:
     return names
 
 
+def _offered(program: Program, symbols: str, library: set[str], own: str) -> set[str]:
+    """The library's functions that linked objects <name>_ops point to, but not those of `own`:
+    through that one a firmware calls the estimator, and nobody inside it does."""
+    names = {line.split()[0]: line.split()[-1] for line in symbols.splitlines()}
+    linked = linked_objects(program)
+    found: set[str] = set()
+    for address, size, name in _OPS.findall(symbols):
+        if name != own:
+            short = {names.get(word) for word in _words(program, int(address, 16), int(size, 16))}
+            found |= {node for node in library if node.rpartition(":")[2] in short
+                      and (":" not in node or Path(node.partition(":")[0]).name in linked)}
+    return found
+
+
+def _words(program: Program, address: int, size: int) -> set[str]:
+    """The addresses of functions in an object, as nm writes them."""
+    dump = _said(program, "objdump", "-s", f"--start-address={address}",
+                 f"--stop-address={address + size}")
+    data = bytes.fromhex("".join(_DUMP.findall(dump)).replace(" ", ""))
+    width = 8 if "elf64" in dump else 4
+    numbers = (int.from_bytes(data[at:at + width], "little") for at in range(0, size, width))
+    thumb = program.target.tools.startswith("arm")  # the lowest bit of an address says so
+    return {f"{number & ~1 if thumb else number:0{2 * width}x}" for number in numbers}
+
+
 def _add_library(graph: CallGraph, listing: str, symbols: str) -> None:
     """What is linked and has no node: routines of libgcc and libc.
 
     The disassembly names a routine once; its other names are symbols of the same address.
     """
     aliases: dict[str, list[str]] = {}
-    for address, _, name in (line.split() for line in symbols.splitlines()):
+    for address, *_, name in (line.split() for line in symbols.splitlines()):
         aliases.setdefault(address, []).append(name)
     for address, shown, body in _FUNCTION.findall(listing):
         calls = {callee for callee in _CALL.findall(body) if callee != shown}
