@@ -121,9 +121,11 @@ std::unique_ptr<MethodTables> load_decentral(TableReader &tables, const blw_plan
     load_sets(tables.nested("sets"), loaded->sets);
     load_ranking(tables.nested("ranking"), loaded->ranking);
     if (tables.has("steady")) {
+        model.gains = &blw_decentral_steady_ops;
         load_steady(tables.nested("steady"), sizes, loaded->sets.n_sets, loaded->steady);
         model.steady = &loaded->steady;
     } else {
+        model.gains = &blw_decentral_recursive_ops;
         load_recursive(tables.nested("recursive"), sizes, loaded->recursive);
         model.recursive = &loaded->recursive;
     }

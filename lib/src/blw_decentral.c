@@ -78,40 +78,10 @@ BLW_COLD blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_
     self->passes = 0U;
     self->calm   = 0U;
     self->usable = true;
-    if (self->model->recursive != NULL) {
-        blw_decentral_recursive_reset(self);
+    if (self->model->gains->reset != NULL) {
+        self->model->gains->reset(self);
     }
     return BLW_OK;
-}
-
-void blw_decentral_advance(blw_decentral_t *self)
-{
-    if (self->model->steady != NULL) {
-        blw_decentral_steady_advance(self);
-    } else {
-        blw_decentral_recursive_advance(self);
-    }
-}
-
-blw_real_t blw_decentral_statistic(blw_decentral_t *self, size_t set)
-{
-    return (self->model->steady != NULL) ? blw_decentral_steady_statistic(self, set)
-                                         : blw_decentral_recursive_statistic(self, set);
-}
-
-void blw_decentral_estimate(blw_decentral_t *self, size_t set)
-{
-    if (self->model->steady != NULL) {
-        blw_decentral_steady_estimate(self, set);
-    } else {
-        blw_decentral_recursive_estimate(self, set);
-    }
-}
-
-blw_real_t blw_decentral_all_statistic(blw_decentral_t *self, size_t set)
-{
-    return (self->model->steady != NULL) ? blw_decentral_steady_all_statistic(self, set)
-                                         : blw_decentral_recursive_statistic(self, 0U);
 }
 
 /* nu_i, suspicion and gap of every sensor; nu_i = 0 where the sample is missing. */
@@ -187,7 +157,7 @@ static void count_calm(blw_decentral_t *self)
 }
 
 /* Leave out sensors that fell silent, unless an attacked one is: silence is no lie. */
-static void leave_out_silent(blw_decentral_t *self, blw_mask_t silent)
+static BLW_COLD void leave_out_silent(blw_decentral_t *self, blw_mask_t silent)
 {
     const blw_decentral_sets_t *const sets = self->model->sets;
     const bool                        free = (self->set == 0U) || (self->calm >= CALM_STEPS);
@@ -199,7 +169,7 @@ static void leave_out_silent(blw_decentral_t *self, blw_mask_t silent)
 
 /* Silent sensors that a new set has to contain: all of them while that leaves one to spare for an
  * attack, else those that are left out already. */
-static blw_mask_t needed_of(const blw_decentral_t *self, blw_mask_t silent)
+static BLW_COLD blw_mask_t needed_of(const blw_decentral_t *self, blw_mask_t silent)
 {
     const bool spare = blw_mask_count(silent) < self->model->head.plant->p;
 
@@ -209,12 +179,12 @@ static blw_mask_t needed_of(const blw_decentral_t *self, blw_mask_t silent)
 static blw_outcome_t search(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared)
 {
     const size_t     best = blw_decentral_search(self, needed, compared);
-    const blw_real_t g    = blw_decentral_statistic(self, best);
+    const blw_real_t g    = self->model->gains->statistic(self, best);
 
     if (best != self->set) {
         exclude(self, best);
     }
-    blw_decentral_estimate(self, best);
+    self->model->gains->estimate(self, best);
     return (g <= blw_decentral_threshold(self->model, best)) ? BLW_OUTCOME_CONVERGED
                                                              : BLW_OUTCOME_HELD;
 }
@@ -232,9 +202,9 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
 
     out->threshold = blw_decentral_threshold(model, 0U);
     leave_out_silent(self, silent);
-    const blw_real_t g = blw_decentral_statistic(self, self->set);
-    blw_decentral_estimate(self, self->set);
-    out->statistic  = (self->set == 0U) ? g : blw_decentral_all_statistic(self, self->set);
+    const blw_real_t g = self->model->gains->statistic(self, self->set);
+    self->model->gains->estimate(self, self->set);
+    out->statistic  = (self->set == 0U) ? g : self->model->gains->all_statistic(self, self->set);
     const bool pass = out->statistic <= out->threshold;
     count_passes(self, pass, used);
     if (warming_up(self)) {
@@ -242,8 +212,8 @@ static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimato
     }
     if ((self->set != 0U) && (model->readmit > 0U) && (self->passes >= model->readmit)) {
         exclude(self, 0U);
-        (void)blw_decentral_statistic(self, 0U);
-        blw_decentral_estimate(self, 0U);
+        (void)self->model->gains->statistic(self, 0U);
+        self->model->gains->estimate(self, 0U);
         return BLW_OUTCOME_KALMAN;
     }
     const blw_mask_t needed  = needed_of(self, silent);
@@ -307,12 +277,12 @@ blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, cons
     self->k += (self->k <= self->model->warm_up) ? 1U : 0U;
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
     innovate(self, y, used);
-    blw_decentral_advance(self);
+    self->model->gains->advance(self);
     const blw_outcome_t outcome = decide(self, used, out);
     count_calm(self);
     if ((self->model->reseed != 0U) && (self->calm >= CALM_STEPS)
         && !(out->statistic <= out->threshold)) {
-        blw_decentral_steady_reseed(self, self->set);
+        self->model->gains->reseed(self, self->set);
         self->calm = 0U;
     }
     used = update(self, used);

@@ -2,7 +2,6 @@
 /* What init() checks before it trusts a model. */
 #include "blw_cold.h"
 #include "blw_decentral_internal.h"
-#include "blw_la.h"
 
 static bool sizes_ok(const blw_decentral_model_t *model)
 {
@@ -19,7 +18,7 @@ static bool sizes_ok(const blw_decentral_model_t *model)
             return false;
         }
     }
-    return (model->steady == NULL) != (model->recursive == NULL);
+    return (model->gains != NULL) && ((model->steady == NULL) != (model->recursive == NULL));
 }
 
 static bool set_ok(const blw_decentral_model_t *model, size_t set)
@@ -125,88 +124,6 @@ static void add_common(const blw_decentral_model_t *model, blw_table_check_t *ch
     }
 }
 
-/* Numbers of the tables that are kept per sensor. */
-typedef struct lengths {
-    size_t F; /* or S */
-    size_t Q;
-    size_t H;
-} lengths_t;
-
-static lengths_t lengths_of(const blw_decentral_model_t *model)
-{
-    const size_t d   = (size_t)model->mu - model->head.plant->n;
-    lengths_t    len = {0U, 0U, 0U};
-
-    for (size_t i = 0U; i < model->head.plant->m; i++) {
-        const size_t mu  = blw_decentral_mu(model, i);
-        const size_t end = model->first[i + 1U];
-        len.F += mu * mu;
-        len.Q += mu * ((end < d) ? end : d);
-        len.H += blw_la_packed_row(mu);
-    }
-    return len;
-}
-
-/* Whether `at` fits the sets. */
-static bool removals_ok(const blw_decentral_model_t *model)
-{
-    const blw_decentral_steady_t *const steady = model->steady;
-
-    if ((steady->at == NULL) || (steady->at[0] != 0U)) {
-        return false;
-    }
-    for (size_t set = 0U; set < model->sets->n_sets; set++) {
-        const size_t rows = blw_decentral_rows(model, set);
-        const size_t mu   = (set > 0U) ? blw_decentral_mu(model, model->sets->sensor[set]) : 0U;
-        const size_t len  = (rows > mu) ? ((mu * (rows - mu)) + blw_la_packed_row(mu)) : 0U;
-        if (steady->at[set + 1U] != (steady->at[set] + len)) {
-            return false;
-        }
-    }
-    return true;
-}
-
-static void add_steady(const blw_decentral_model_t *model, blw_table_check_t *check)
-{
-    const blw_decentral_steady_t *const steady = model->steady;
-    const size_t                        n      = model->head.plant->n;
-    const size_t                        mu     = model->mu;
-    const size_t                        d      = mu - n;
-    const lengths_t                     len    = lengths_of(model);
-
-    if ((steady->d != d) || !removals_ok(model)) {
-        check->ok = false;
-        return;
-    }
-    blw_table_add(check, steady->F, len.F);
-    blw_table_add(check, steady->K, mu);
-    blw_table_add(check, steady->N, (d * mu) - ((d * (d - 1U)) / 2U));
-    blw_table_add(check, steady->Psi, n * mu);
-    blw_table_add(check, steady->Q, len.Q);
-    blw_table_add(check, steady->Y, mu * n);
-    blw_table_add(check, steady->H, (model->reseed != 0U) ? len.H : 0U);
-    blw_table_add(check, steady->M, steady->at[model->sets->n_sets]);
-}
-
-static void add_recursive(const blw_decentral_model_t *model, blw_table_check_t *check)
-{
-    const blw_decentral_recursive_t *const recursive = model->recursive;
-    const size_t                           n         = model->head.plant->n;
-    const size_t                           m         = model->head.plant->m;
-    const size_t                           mu        = model->mu;
-
-    blw_table_add(check, recursive->S, lengths_of(model).F);
-    blw_table_add(check, recursive->t, mu);
-    blw_table_add(check, recursive->V, mu * n);
-    blw_table_add(check, recursive->E, blw_la_packed_row(m));
-    blw_table_add(check, recursive->L0, mu * n);
-    blw_table_add(check, recursive->Psi, n * mu);
-    check->ok = check->ok && (model->reseed == 0U) && (model->warm_up == 0U);
-    for (size_t i = 0U; check->ok && (i < m); i++) {
-        check->ok = positive(1U, &recursive->E[blw_la_packed_row(i) + i]);
-    }
-}
-
 BLW_COLD blw_status_t blw_decentral_check(const blw_decentral_model_t *model)
 {
     blw_table_check_t  check;
@@ -219,10 +136,6 @@ BLW_COLD blw_status_t blw_decentral_check(const blw_decentral_model_t *model)
         return BLW_ERR_MODEL;
     }
     add_common(model, &check);
-    if (model->steady != NULL) {
-        add_steady(model, &check);
-    } else {
-        add_recursive(model, &check);
-    }
+    model->gains->add(model, &check);
     return blw_model_end(&model->head, &check);
 }

@@ -1,12 +1,28 @@
 /* SPDX-License-Identifier: MIT */
 /** @file blw_decentral_internal.h  Private: what the parts of `decentral` share.
- *
- *  Either kind of gains offers the same four operations.  statistic() must come before estimate()
- *  of the same set, and both before all_statistic().
  */
 #ifndef BLW_DECENTRAL_INTERNAL_H
 #define BLW_DECENTRAL_INTERNAL_H
 #include "blw/blw_decentral.h"
+
+/** What either kind of gains offers.  statistic() must come before estimate() of the same set, and
+ *  both before all_statistic(). */
+struct blw_decentral_gains {
+    /** Check the own tables and add them to the walk. */
+    void (*add)(const blw_decentral_model_t *model, blw_table_check_t *check);
+    /** Begin anew; NULL: there is nothing to begin. */
+    void (*reset)(blw_decentral_t *self);
+    /** Local filters (1) with self->nu, in place. */
+    void (*advance)(blw_decentral_t *self);
+    /** g_J of (4) for J = all sensors but those of a set. */
+    blw_real_t (*statistic)(blw_decentral_t *self, size_t set);
+    /** self->dx = x_J - x_bar for the set of the last statistic(). */
+    void (*estimate)(blw_decentral_t *self, size_t set);
+    /** g of all sensors, after statistic() and estimate() of a set. */
+    blw_real_t (*all_statistic)(blw_decentral_t *self, size_t set);
+    /** (5) for the sensors of the set of the last estimate(); NULL where the model cannot ask. */
+    void (*reseed)(blw_decentral_t *self, size_t set);
+};
 
 /** Local states of sensor i. */
 static inline size_t blw_decentral_mu(const blw_decentral_model_t *model, size_t i)
@@ -33,26 +49,5 @@ size_t blw_decentral_cover(const blw_decentral_sets_t *sets, blw_mask_t sensors)
 /** The candidate with the most plausible statistic among those that contain the sensors of
  *  `needed`; self->set if there is none.  @param compared counts the candidates looked at */
 size_t blw_decentral_search(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared);
-
-/** Local filters (1) with self->nu, in place. */
-void blw_decentral_advance(blw_decentral_t *self);
-/** g_J of (4) for J = all sensors but those of a set. */
-blw_real_t blw_decentral_statistic(blw_decentral_t *self, size_t set);
-/** self->dx = x_J - x_bar for the set of the last statistic(). */
-void blw_decentral_estimate(blw_decentral_t *self, size_t set);
-/** g of all sensors, after statistic() and estimate() of a set. */
-blw_real_t blw_decentral_all_statistic(blw_decentral_t *self, size_t set);
-
-void       blw_decentral_steady_advance(blw_decentral_t *self);
-blw_real_t blw_decentral_steady_statistic(blw_decentral_t *self, size_t set);
-void       blw_decentral_steady_estimate(blw_decentral_t *self, size_t set);
-blw_real_t blw_decentral_steady_all_statistic(blw_decentral_t *self, size_t set);
-/** (5) for the sensors of the set of the last estimate(). */
-void blw_decentral_steady_reseed(blw_decentral_t *self, size_t set);
-
-void       blw_decentral_recursive_reset(blw_decentral_t *self);
-void       blw_decentral_recursive_advance(blw_decentral_t *self);
-blw_real_t blw_decentral_recursive_statistic(blw_decentral_t *self, size_t set);
-void       blw_decentral_recursive_estimate(blw_decentral_t *self, size_t set);
 
 #endif

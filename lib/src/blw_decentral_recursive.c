@@ -74,7 +74,7 @@ static bool invertible(const blw_decentral_t *self)
     return true;
 }
 
-BLW_COLD void blw_decentral_recursive_reset(blw_decentral_t *self)
+static BLW_COLD void reset(blw_decentral_t *self)
 {
     const size_t mu    = self->model->mu;
     const size_t n     = self->model->head.plant->n;
@@ -136,7 +136,7 @@ static void correct_factor(blw_decentral_t *self, size_t sensor)
     }
 }
 
-void blw_decentral_recursive_advance(blw_decentral_t *self)
+static void advance(blw_decentral_t *self)
 {
     const blw_decentral_model_t *const model = self->model;
     const blw_real_t                  *S     = model->recursive->S;
@@ -182,7 +182,7 @@ static size_t whiten_columns(blw_decentral_t *self, size_t set)
     return columns;
 }
 
-blw_real_t blw_decentral_recursive_statistic(blw_decentral_t *self, size_t set)
+static blw_real_t statistic(blw_decentral_t *self, size_t set)
 {
     const size_t mu = self->model->mu;
 
@@ -204,7 +204,7 @@ blw_real_t blw_decentral_recursive_statistic(blw_decentral_t *self, size_t set)
     return blw_la_dot(mu - columns, &rhs[columns], &rhs[columns]);
 }
 
-void blw_decentral_recursive_estimate(blw_decentral_t *self, size_t set)
+static void estimate(blw_decentral_t *self, size_t set)
 {
     const blw_decentral_model_t *const model = self->model;
     const size_t                       mu    = model->mu;
@@ -222,3 +222,47 @@ void blw_decentral_recursive_estimate(blw_decentral_t *self, size_t set)
         blw_la_axpy(j, -self->dx[j], column, self->dx);
     }
 }
+
+/* The factors hold no trace of the set. */
+static blw_real_t all_statistic(blw_decentral_t *self, size_t set)
+{
+    (void)set;
+    return statistic(self, 0U);
+}
+
+static BLW_COLD void add(const blw_decentral_model_t *model, blw_table_check_t *check)
+{
+    const blw_decentral_recursive_t *const recursive = model->recursive;
+    const size_t                           n         = model->head.plant->n;
+    const size_t                           m         = model->head.plant->m;
+    const size_t                           mu        = model->mu;
+    size_t                                 squares   = 0U;
+
+    if (recursive == NULL) {
+        check->ok = false;
+        return;
+    }
+    for (size_t i = 0U; i < m; i++) {
+        squares += blw_decentral_mu(model, i) * blw_decentral_mu(model, i);
+    }
+    blw_table_add(check, recursive->S, squares);
+    blw_table_add(check, recursive->t, mu);
+    blw_table_add(check, recursive->V, mu * n);
+    blw_table_add(check, recursive->E, blw_la_packed_row(m));
+    blw_table_add(check, recursive->L0, mu * n);
+    blw_table_add(check, recursive->Psi, n * mu);
+    check->ok = check->ok && (model->reseed == 0U) && (model->warm_up == 0U);
+    for (size_t i = 0U; check->ok && (i < m); i++) {
+        check->ok = recursive->E[blw_la_packed_row(i) + i] > BLW_R(0.0);
+    }
+}
+
+const blw_decentral_gains_t blw_decentral_recursive_ops = {
+    .add           = add,
+    .reset         = reset,
+    .advance       = advance,
+    .statistic     = statistic,
+    .estimate      = estimate,
+    .all_statistic = all_statistic,
+    .reseed        = NULL,
+};

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* Sets of sensors: their members, their thresholds, and which one is the most plausible. */
+#include "blw_cold.h"
 #include "blw_decentral_internal.h"
 #include "blw_la.h"
 
@@ -92,7 +93,7 @@ size_t blw_decentral_search(blw_decentral_t *self, blw_mask_t needed, uint16_t *
             continue;
         }
         const blw_real_t score =
-            blw_decentral_score(self->model, set, blw_decentral_statistic(self, set));
+            blw_decentral_score(self->model, set, self->model->gains->statistic(self, set));
         if ((*compared == 0U) || (score < low)) {
             low  = score;
             best = set;
@@ -102,7 +103,7 @@ size_t blw_decentral_search(blw_decentral_t *self, blw_mask_t needed, uint16_t *
     return best;
 }
 
-size_t blw_decentral_cover(const blw_decentral_sets_t *sets, blw_mask_t sensors)
+BLW_COLD size_t blw_decentral_cover(const blw_decentral_sets_t *sets, blw_mask_t sensors)
 {
     size_t   best    = 0U;
     unsigned covered = 0U;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /* Steady-state gains: all that is factored comes as tables. */
+#include "blw_cold.h"
 #include "blw_decentral_internal.h"
 #include "blw_la.h"
 
-void blw_decentral_steady_advance(blw_decentral_t *self)
+static void advance(blw_decentral_t *self)
 {
     const blw_decentral_model_t *const  model  = self->model;
     const blw_decentral_steady_t *const steady = model->steady;
@@ -90,7 +91,7 @@ static void build(blw_decentral_t *self, size_t set)
     }
 }
 
-blw_real_t blw_decentral_steady_statistic(blw_decentral_t *self, size_t set)
+static blw_real_t statistic(blw_decentral_t *self, size_t set)
 {
     blw_decentral_leave_out(self, set);
     const blw_real_t g = whiten(self);
@@ -125,7 +126,7 @@ static void correct(blw_decentral_t *self, size_t set, size_t before)
     }
 }
 
-void blw_decentral_steady_estimate(blw_decentral_t *self, size_t set)
+static void estimate(blw_decentral_t *self, size_t set)
 {
     const blw_decentral_model_t *const model  = self->model;
     size_t                             before = blw_decentral_rows(model, set);
@@ -153,7 +154,7 @@ static void put_back(blw_decentral_t *self, size_t sensor)
     }
 }
 
-blw_real_t blw_decentral_steady_all_statistic(blw_decentral_t *self, size_t set)
+static blw_real_t all_statistic(blw_decentral_t *self, size_t set)
 {
     const blw_decentral_sets_t *const sets = self->model->sets;
 
@@ -164,7 +165,7 @@ blw_real_t blw_decentral_steady_all_statistic(blw_decentral_t *self, size_t set)
 }
 
 /* delta_i = -R_i^-1 s_i; estimate() has left s in self->t. */
-static void reseed_sensor(blw_decentral_t *self, size_t sensor, const blw_real_t *s)
+static BLW_COLD void reseed_sensor(blw_decentral_t *self, size_t sensor, const blw_real_t *s)
 {
     const blw_decentral_model_t *const model = self->model;
     const size_t                       mu    = blw_decentral_mu(model, sensor);
@@ -180,7 +181,7 @@ static void reseed_sensor(blw_decentral_t *self, size_t sensor, const blw_real_t
     }
 }
 
-void blw_decentral_steady_reseed(blw_decentral_t *self, size_t set)
+static BLW_COLD void reseed(blw_decentral_t *self, size_t set)
 {
     const blw_decentral_model_t *const model  = self->model;
     size_t                             before = blw_decentral_rows(model, set);
@@ -191,3 +192,74 @@ void blw_decentral_steady_reseed(blw_decentral_t *self, size_t set)
         reseed_sensor(self, sensor, &self->t[before]);
     }
 }
+
+/* Numbers of the tables that are kept per sensor. */
+typedef struct lengths {
+    size_t F;
+    size_t Q;
+    size_t H;
+} lengths_t;
+
+static lengths_t lengths_of(const blw_decentral_model_t *model)
+{
+    lengths_t len = {0U, 0U, 0U};
+
+    for (size_t i = 0U; i < model->head.plant->m; i++) {
+        const size_t mu = blw_decentral_mu(model, i);
+        len.F += mu * mu;
+        len.Q += mu * rows_of_q(model, i);
+        len.H += blw_la_packed_row(mu);
+    }
+    return len;
+}
+
+/* Whether `at` fits the sets. */
+static bool removals_ok(const blw_decentral_model_t *model)
+{
+    const blw_decentral_steady_t *const steady = model->steady;
+
+    if ((steady->at == NULL) || (steady->at[0] != 0U)) {
+        return false;
+    }
+    for (size_t set = 0U; set < model->sets->n_sets; set++) {
+        const size_t rows = blw_decentral_rows(model, set);
+        const size_t mu   = (set > 0U) ? blw_decentral_mu(model, model->sets->sensor[set]) : 0U;
+        const size_t len  = (rows > mu) ? ((mu * (rows - mu)) + blw_la_packed_row(mu)) : 0U;
+        if (steady->at[set + 1U] != (steady->at[set] + len)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static BLW_COLD void add(const blw_decentral_model_t *model, blw_table_check_t *check)
+{
+    const blw_decentral_steady_t *const steady = model->steady;
+    const size_t                        n      = model->head.plant->n;
+    const size_t                        mu     = model->mu;
+    const size_t                        d      = mu - n;
+
+    if ((steady == NULL) || (steady->d != d) || !removals_ok(model)) {
+        check->ok = false;
+        return;
+    }
+    const lengths_t len = lengths_of(model);
+    blw_table_add(check, steady->F, len.F);
+    blw_table_add(check, steady->K, mu);
+    blw_table_add(check, steady->N, (d * mu) - ((d * (d - 1U)) / 2U));
+    blw_table_add(check, steady->Psi, n * mu);
+    blw_table_add(check, steady->Q, len.Q);
+    blw_table_add(check, steady->Y, mu * n);
+    blw_table_add(check, steady->H, (model->reseed != 0U) ? len.H : 0U);
+    blw_table_add(check, steady->M, steady->at[model->sets->n_sets]);
+}
+
+const blw_decentral_gains_t blw_decentral_steady_ops = {
+    .add           = add,
+    .reset         = NULL,
+    .advance       = advance,
+    .statistic     = statistic,
+    .estimate      = estimate,
+    .all_statistic = all_statistic,
+    .reseed        = reseed,
+};

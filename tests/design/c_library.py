@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from blw.design import plant_tables
-from blw.tables import Struct
+from blw.tables import Link, Struct
 
 LIB = Path(__file__).resolve().parents[2] / "lib"
 SHARED_SOURCES = ("blw_la", "blw_model", "blw_step")
@@ -103,7 +103,9 @@ class CLibrary:
         target, fields, plain = kind(), dict(kind._fields_), struct.to_json()
         for name, member in struct.members.items():
             value = plain[name]
-            if isinstance(member, Struct):
+            if isinstance(member, Link):
+                value = ct.addressof(ct.c_char.in_dll(self.lib, member.symbol))
+            elif isinstance(member, Struct):
                 value = ct.pointer(self._fill(fields[name]._type_, member))
             elif isinstance(value, list):
                 element = fields[name]._type_

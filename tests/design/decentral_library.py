@@ -33,8 +33,8 @@ def layouts(real: type) -> dict[str, type]:
     model = structure("Model", ("head", common["head"]),
                    *each(word, "mu", "rows", "warm_up", "readmit", "max_gap"), ("reseed", byte),
                    ("first", words), *each(pointer, "Phi", "scale"), ("sets", ct.POINTER(sets)),
-                   ("ranking", ct.POINTER(ranking)), ("steady", ct.POINTER(steady)),
-                   ("recursive", ct.POINTER(recursive)))
+                   ("ranking", ct.POINTER(ranking)), ("gains", ct.c_void_p),
+                   ("steady", ct.POINTER(steady)), ("recursive", ct.POINTER(recursive)))
     return common | {"model": model}
 
 

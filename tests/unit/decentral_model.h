@@ -169,6 +169,7 @@ static inline void decentral_make(decentral_made_t *made, bool recursive)
         .E         = {BLW_R(1.0), BLW_R(0.0), BLW_R(1.0), BLW_R(0.0), BLW_R(0.0), BLW_R(1.0)},
     };
     decentral_point(made);
+    made->model.gains     = recursive ? &blw_decentral_recursive_ops : &blw_decentral_steady_ops;
     made->model.steady    = recursive ? NULL : &made->steady;
     made->model.recursive = recursive ? &made->recursive : NULL;
     decentral_seal(made);

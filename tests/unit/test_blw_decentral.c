@@ -209,7 +209,7 @@ static void test_search_given_degrees_of_freedom_compares_g_plus_c(void)
         filter.delta[1] = blw_la_sqrt(BLW_R(2.0) * blw_la_max(g[i], BLW_R(0.0)));
         filter.delta[2] = BLW_R(0.0);
         TEST_ASSERT_REAL_WITHIN(5000.0 * SUPPORT_TOL, (g[i] > BLW_R(0.0)) ? (double)g[i] : 0.0,
-                                blw_decentral_statistic(&filter, 1U));
+                                made.model.gains->statistic(&filter, 1U));
         TEST_ASSERT_REAL_WITHIN(5000.0 * SUPPORT_TOL, (double)g[i] + offset[i],
                                 blw_decentral_score(&made.model, 1U, g[i]));
         TEST_ASSERT_EQUAL_size_t((g[i] > BLW_R(0.0)) ? 2U : 1U,
@@ -247,10 +247,10 @@ static void test_statistic_given_a_set_of_two_leaves_nothing_to_test(void)
     filter.delta[0] = BLW_R(7.0);
     filter.delta[1] = BLW_R(-3.0);
     filter.delta[2] = BLW_R(2.0);
-    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, blw_decentral_statistic(&filter, 4U));
-    blw_decentral_estimate(&filter, 4U);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, made.model.gains->statistic(&filter, 4U));
+    made.model.gains->estimate(&filter, 4U);
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.0, filter.dx[0]);
-    TEST_ASSERT_REAL_WITHIN(64.0 * SUPPORT_TOL, 50.0, blw_decentral_all_statistic(&filter, 4U));
+    TEST_ASSERT_REAL_WITHIN(64.0 * SUPPORT_TOL, 50.0, made.model.gains->all_statistic(&filter, 4U));
 }
 
 static void test_step_given_recursive_gains_yields_hand_computed_estimate(void)

@@ -88,6 +88,10 @@ static void test_init_given_wrong_sizes_refuses(void)
     assert_broken();
     made.model.recursive = &made.recursive;
     assert_broken();
+    made.model.gains = NULL;
+    assert_broken();
+    made.model.gains = &blw_decentral_recursive_ops;
+    assert_broken();
     made.steady.d = 3U;
     assert_broken();
 }
@@ -161,6 +165,8 @@ static void test_init_given_wrong_gains_refuses(void)
     made.steady.N = NULL;
     assert_broken();
     decentral_make(&made, true);
+    made.model.gains = &blw_decentral_steady_ops;
+    assert_broken();
     made.E[2] = BLW_R(0.0);
     assert_broken();
     made.model.reseed = 1U;

@@ -31,7 +31,7 @@ from blw.design import Designed
 from blw.errors import DesignError
 from blw.kalman import Kalman
 from blw.model import Model
-from blw.tables import Index, Real, Struct, Table, index, table
+from blw.tables import Index, Link, Real, Struct, Table, index, table
 
 NAME = "decentral"
 AVERAGES = True
@@ -102,6 +102,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
                        "[m] innovation to 1 at its threshold"),
         "sets": _sets_struct(model, tree),
         "ranking": ranking.struct(),
+        "gains": Link(f"blw_decentral_{options.gains}_ops", options.gains),
         "steady": engine if steady else None,
         "recursive": None if steady else engine,
     }, method=NAME)

@@ -53,7 +53,15 @@ typedef struct blw_decentral_ranking {
     const blw_real_t *c;        /**< [n_ranked x n_knots] */
 } blw_decentral_ranking_t;
 
-/** Steady-state gains. */
+/** A kind of gains.  The model holds its address, so that a firmware links only the one it uses. */
+typedef struct blw_decentral_gains blw_decentral_gains_t;
+
+/** Steady-state gains: everything factored is in tables. */
+extern const blw_decentral_gains_t blw_decentral_steady_ops;
+/** Gains from a recursion on the device. */
+extern const blw_decentral_gains_t blw_decentral_recursive_ops;
+
+/** Tables of steady-state gains. */
 typedef struct blw_decentral_steady {
     uint16_t          d;   /**< mu - n, >= 1 */
     const blw_real_t *F;   /**< per sensor [mu_i x mu_i] (I - K_i t_i) S_i */
@@ -69,7 +77,7 @@ typedef struct blw_decentral_steady {
                                 lower [mu_b (mu_b + 1) / 2]; nothing for sets of one sensor */
 } blw_decentral_steady_t;
 
-/** Gains from a recursion on the device. */
+/** Tables of gains from a recursion. */
 typedef struct blw_decentral_recursive {
     const blw_real_t *S;   /**< per sensor [mu_i x mu_i] Z_i' A Z_i */
     const blw_real_t *t;   /**< [mu] C_i Z_i */
@@ -93,7 +101,8 @@ typedef struct blw_decentral_model {
     const blw_real_t                *scale;   /**< [m] nu_i to 1 at its own threshold, > 0 */
     const blw_decentral_sets_t      *sets;
     const blw_decentral_ranking_t   *ranking;
-    const blw_decentral_steady_t    *steady; /**< one of the two, the other one NULL */
+    const blw_decentral_gains_t     *gains;
+    const blw_decentral_steady_t    *steady; /**< the tables of those gains, the other one NULL */
     const blw_decentral_recursive_t *recursive;
 } blw_decentral_model_t;
 

@@ -5,7 +5,7 @@ Routines of the compiler's library have no such graph; theirs is read off the di
 sum over all of a routine's pushes is an upper bound.  A call through a pointer may go to any
 straight-line kernel of the model that the linker kept, and to any function of the const objects
 <name>_ops in which modules offer themselves to each other; not back to where it comes from, since
-the library has no recursion.  A frame of unknown size is an error, not a guess, and so is recursion.
+the library has no recursion.  Recursion and a frame of unknown size are errors, not guesses.
 """
 
 import re
@@ -39,14 +39,13 @@ class CallGraph:
 
     def deepest(self, root: str, path: tuple[str, ...] = ()) -> int:
         """Bytes of the deepest path from root.  Raises StepFailed if no bound is known."""
-        if root in path:
+        if root in path and root != _POINTER:
             raise StepFailed(f"recursion: {' -> '.join((*path, root))}")
         if root not in self.frames:
             raise StepFailed(f"the stack of {root} is not known")
         callees = self.calls.get(root, set())
         if root == _POINTER:
             callees = callees.difference(path)
-            path = tuple(step for step in path if step != _POINTER)
         below = (self.deepest(callee, (*path, root)) for callee in callees)
         return self.frames[root] + max(below, default=0)
 

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: MIT
+"""The deepest path through a call graph."""
+
+import pytest
+
+from blw.build import StepFailed
+from blw.cost.stack import CallGraph
+
+POINTER = "__indirect_call"
+
+
+def graph(frames, calls):
+    return CallGraph({POINTER: 0, **frames}, {name: set(to) for name, to in calls.items()})
+
+
+def test_deepest_given_two_branches_takes_the_larger_one():
+    made = graph({"root": 8, "a": 16, "b": 4, "c": 40}, {"root": ["a", "b"], "b": ["c"]})
+    assert made.deepest("root") == 8 + 4 + 40
+
+
+def test_deepest_given_a_pointer_takes_the_deepest_function_it_may_mean():
+    made = graph({"root": 8, "engine": 100, "kernel": 20},
+                 {"root": [POINTER], "engine": [POINTER], POINTER: ["engine", "kernel"]})
+    assert made.deepest("root") == 8 + 100 + 20
+
+
+def test_deepest_given_recursion_fails_by_name():
+    made = graph({"root": 8, "a": 16}, {"root": ["a"], "a": ["root"]})
+    with pytest.raises(StepFailed, match="recursion: root -> a -> root"):
+        made.deepest("root")
+
+
+def test_deepest_given_a_function_without_a_frame_fails_by_name():
+    with pytest.raises(StepFailed, match="the stack of other is not known"):
+        graph({"root": 8}, {"root": ["other"]}).deepest("root")
