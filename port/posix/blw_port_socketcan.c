@@ -88,18 +88,19 @@ static bool alive(blw_port_socketcan_t *self)
         return true;
     }
     const uint64_t now_us = blw_posix_now_us();
-    if (now_us < self->retry_us) {
+    if ((now_us < self->retry_us) || (self->name[0] == '\0')) {
         return false;
     }
     self->retry_us = now_us + BLW_POSIX_RETRY_US;
     return open_socket(self) == 0;
 }
 
+/* A controller that is off the bus may say so more than once. */
 static void take_error_frame(blw_port_socketcan_t *self, uint32_t id)
 {
     if ((id & CAN_ERR_BUSOFF) != 0U) {
+        self->counters.bus_off += self->bus_off ? 0U : 1U;
         self->bus_off = true;
-        self->counters.bus_off++;
     } else if ((id & CAN_ERR_RESTARTED) != 0U) {
         self->bus_off = false;
     } else {
@@ -155,6 +156,7 @@ static bool socketcan_recv(blw_port_t *base, blw_frame_t *frame)
             take_error_frame(self, raw.can_id);
             continue;
         }
+        self->bus_off = false; /* whoever hears a frame is on the bus, restarted or set up again */
         if (((raw.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG)) != 0U) || (raw.len > BLW_FRAME_MAX)) {
             self->counters.foreign++;
             continue;
@@ -204,17 +206,29 @@ static uint64_t socketcan_now_us(blw_port_t *base)
 static const blw_port_ops_t socketcan_ops = {
     .now_us = socketcan_now_us, .recv = socketcan_recv, .send = socketcan_send};
 
-int blw_port_socketcan_open(blw_port_socketcan_t *self, const char *interface, bool can_fd)
+static void start(blw_port_socketcan_t *self, bool can_fd)
 {
     (void)memset(self, 0, sizeof *self);
     self->base.ops = &socketcan_ops;
     self->fd       = -1;
     self->can_fd   = can_fd;
+}
+
+int blw_port_socketcan_open(blw_port_socketcan_t *self, const char *interface, bool can_fd)
+{
+    start(self, can_fd);
     if (strlen(interface) >= sizeof self->name) {
         return ENODEV;
     }
     (void)strncpy(self->name, interface, sizeof self->name - 1U);
     return open_socket(self);
+}
+
+int blw_port_socketcan_adopt(blw_port_socketcan_t *self, int fd, bool can_fd)
+{
+    start(self, can_fd);
+    self->fd = fd;
+    return blw_posix_prepare(fd);
 }
 
 void blw_port_socketcan_close(blw_port_socketcan_t *self)

@@ -3,9 +3,12 @@
 #include "blw_port_replay.h"
 #include "blw_port_serial.h"
 #include "blw/blw_wire.h"
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
+#include <sys/un.h>
+#include <time.h>
 #include <unistd.h>
 #ifdef BLW_WITH_LCM
 #include "blw_port_lcm.h"
@@ -98,6 +101,49 @@ static void test_serial_given_a_peer_that_goes_reports_the_loss(void)
     TEST_ASSERT_EQUAL_UINT64(1U, other.counters.lost);
     TEST_ASSERT_FALSE(blw_port_send(&other.base, &frame)); /* and there is no signal */
     TEST_ASSERT_EQUAL_INT(-1, blw_port_serial_handle(&other));
+}
+
+static int listen_on(const char *path)
+{
+    struct sockaddr_un address = {.sun_family = AF_UNIX};
+    const int          fd      = socket(AF_UNIX, SOCK_STREAM, 0);
+
+    (void)strncpy(address.sun_path, path, sizeof address.sun_path - 1U);
+    TEST_ASSERT_EQUAL_INT(0, bind(fd, (const struct sockaddr *)&address, sizeof address));
+    TEST_ASSERT_EQUAL_INT(0, listen(fd, 1));
+    return fd;
+}
+
+static void test_serial_given_a_peer_that_comes_back_recovers(void)
+{
+    const struct timespec wait     = {.tv_nsec = 1000L * (long)BLW_POSIX_RETRY_US};
+    char                  folder[] = "/tmp/blw_serial.XXXXXX";
+    char                  path[40];
+    char                  place[48];
+    blw_port_serial_t     port;
+    blw_frame_t           frame;
+
+    TEST_ASSERT_NOT_NULL(mkdtemp(folder));
+    (void)snprintf(path, sizeof path, "%s/line", folder);
+    (void)snprintf(place, sizeof place, "unix:%s", path);
+    const int server = listen_on(path);
+    TEST_ASSERT_EQUAL_INT(0, blw_port_serial_open(&port, place));
+    (void)close(accept(server, NULL, NULL));
+    TEST_ASSERT_FALSE(blw_port_recv(&port.base, &frame));
+    TEST_ASSERT_TRUE(port.down);
+    (void)nanosleep(&wait, NULL);
+    TEST_ASSERT_FALSE(blw_port_recv(&port.base, &frame)); /* opens it again */
+    TEST_ASSERT_FALSE(port.down);
+    const int peer = accept(server, NULL, NULL);
+    TEST_ASSERT_EQUAL_INT(8, (int)write(peer, "t1011FF\r", 8U));
+    TEST_ASSERT_TRUE(blw_port_recv(&port.base, &frame));
+    TEST_ASSERT_EQUAL_HEX16(0x101U, frame.id);
+    TEST_ASSERT_EQUAL_UINT64(1U, port.counters.lost);
+    blw_port_serial_close(&port);
+    (void)close(peer);
+    (void)close(server);
+    (void)unlink(path);
+    (void)rmdir(folder);
 }
 
 static void test_serial_open_given_no_such_place_refuses(void)
@@ -236,6 +282,7 @@ int main(void)
     RUN_TEST(test_serial_given_many_frames_loses_and_reorders_none);
     RUN_TEST(test_serial_given_commands_answers_them_as_an_adapter_does);
     RUN_TEST(test_serial_given_a_peer_that_goes_reports_the_loss);
+    RUN_TEST(test_serial_given_a_peer_that_comes_back_recovers);
     RUN_TEST(test_serial_open_given_no_such_place_refuses);
     RUN_TEST(test_replay_given_a_log_yields_its_frames_in_its_time);
 #ifdef BLW_WITH_LCM
