@@ -58,12 +58,16 @@ public:
     void run()
     {
         std::vector<Link *> links   = {node_side_.get()};
+        std::vector<Watch>  watches = {{*node_side_, options_.link}};
         std::uint64_t       last_us = blw_port_now_us(node_side_->port());
         if (sensor_side_) {
             links.push_back(sensor_side_.get());
+            watches.emplace_back(*sensor_side_, options_.sensor_link);
         }
         while (!ended_ && !bus_interrupted) {
-            if (pump()) {
+            const bool any = pump();
+            std::for_each(watches.begin(), watches.end(), [](Watch &watch) { watch.look(); });
+            if (any) {
                 last_us = blw_port_now_us(node_side_->port());
             } else {
                 wait_for(links, WAIT_MS);

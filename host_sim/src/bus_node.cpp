@@ -3,6 +3,7 @@
 #include "bus.h"
 #include "error.h"
 #include "session.h"
+#include "shared_link.h"
 #include "trial.h"
 #include "words.h"
 #include <algorithm>
@@ -19,79 +20,50 @@ const std::uint64_t SECOND   = 1000000U;
 const std::uint8_t  BABBLING = 8U;
 const int           NO_RUN   = 1;
 
-/* A node that nobody hears. */
-class Mute
+const blw_estimator_ops_t *ops_of(const BusOptions &options)
 {
-public:
-    explicit Mute(blw_port_t *inner) : inner_(inner)
-    {
-        port_.self     = this;
-        port_.base.ops = &OPS;
-    }
-    blw_port_t *port()
-    {
-        return &port_.base;
-    }
+    return options.fusion ? &blw_lasso_fusion_ops : nullptr;
+}
 
-private:
-    struct Port {
-        blw_port_t base;
-        Mute      *self;
-    };
-    static Mute *of(blw_port_t *port)
-    {
-        return reinterpret_cast<Port *>(port)->self;
-    }
-    static std::uint64_t now_us(blw_port_t *port)
-    {
-        return blw_port_now_us(of(port)->inner_);
-    }
-    static bool recv(blw_port_t *port, blw_frame_t *frame)
-    {
-        return blw_port_recv(of(port)->inner_, frame);
-    }
-    static bool send(blw_port_t * /*port*/, const blw_frame_t * /*frame*/)
-    {
-        return true;
-    }
-    static const blw_port_ops_t OPS;
-
-    blw_port_t *inner_;
-    Port        port_{};
-};
-
-const blw_port_ops_t Mute::OPS = {Mute::now_us, Mute::recv, Mute::send};
+/* Local states per sensor where they are what is collected, else 1. */
+std::uint8_t width_of(const BusOptions &options, const Design &design, const Plant &plant,
+                      const std::string &method)
+{
+    return options.fusion ? split_model(Estimator(design, plant, method, ops_of(options))).jordan->r
+                          : std::uint8_t{1};
+}
 
 /* One method on the bus, and what it said. */
 class MethodNode
 {
 public:
     MethodNode(const BusOptions &options, const Design &design, const Plant &plant,
-               const std::string &method, bool speaks)
-        : design_(design),
-          estimator_(design, plant, method, options.fusion ? &blw_lasso_fusion_ops : nullptr),
-          width_(options.fusion ? split_model(estimator_).jordan->r : std::uint8_t{1}),
-          link_(open_link(options.link, plant.tables, width_)),
-          mute_(link_->port()), trace_{method, {}, estimator_.extra_columns()},
-          memory_(BLW_NODE_MEM(design.m, width_, design.l))
+               const std::string &method, std::uint8_t width, Link &link, blw_port_t *port)
+        : design_(design), estimator_(design, plant, method, ops_of(options)),
+          link_(link), trace_{method, {}, estimator_.extra_columns()},
+          memory_(BLW_NODE_MEM(design.m, width, design.l))
     {
-        config_.model          = model_id(design.model_sha256);
-        config_.period_us      = options.period_us;
-        config_.deadline_us    = options.deadline_us;
-        config_.settle_us      = options.settle_us;
-        config_.quarantine     = options.quarantine;
-        config_.max_gap        = options.max_gap;
-        config_.babbling       = BABBLING;
-        config_.collects       = options.fusion ? BLW_WIRE_ZETA : BLW_WIRE_MEASUREMENT;
-        config_.width          = width_;
-        config_.format         = static_cast<std::uint8_t>(link_->format());
-        blw_port_t *const port = speaks ? link_->port() : mute_.port();
+        config_.model       = model_id(design.model_sha256);
+        config_.period_us   = options.period_us;
+        config_.deadline_us = options.deadline_us;
+        config_.settle_us   = options.settle_us;
+        config_.quarantine  = options.quarantine;
+        config_.max_gap     = options.max_gap;
+        config_.babbling    = BABBLING;
+        config_.collects    = options.fusion ? BLW_WIRE_ZETA : BLW_WIRE_MEASUREMENT;
+        config_.width       = width;
+        config_.format      = static_cast<std::uint8_t>(link.format());
         if (blw_node_init(&node_, &config_, &plant.tables, estimator_.handle(), port,
                           memory_.data(), memory_.size())
             != BLW_OK) {
             throw InputError("--deadline-us has to be above 0, and the model to fit on the bus");
         }
-        link_->describe(method, node_.report);
+    }
+
+    /* This node's reports are what the link tells. */
+    void speak()
+    {
+        link_.describe(trace_.method, node_.report);
     }
 
     /* Make the steps that are due.  @return whether there were any. */
@@ -110,10 +82,6 @@ public:
     bool done() const
     {
         return blw_node_done(&node_);
-    }
-    Link &link()
-    {
-        return *link_;
     }
     const Trace &trace() const
     {
@@ -140,73 +108,114 @@ public:
                 {"no_sync", c.no_sync},
                 {"restarts", c.restarts},
                 {"unsent", c.unsent},
-                {"link", link_->counters()}};
+                {"link", link_.counters()}};
     }
 
 private:
     const Design           &design_;
     Estimator               estimator_;
-    std::uint8_t            width_;
-    std::unique_ptr<Link>   link_;
-    Mute                    mute_;
+    Link                   &link_;
     Trace                   trace_;
     blw_node_config_t       config_{};
     std::vector<blw_real_t> memory_;
     blw_node_t              node_{};
 };
 
-using Nodes = std::vector<std::unique_ptr<MethodNode>>;
-
-/* The speaker last: its answer lets the plant go on, and then the others have made the step too. */
-Nodes make_nodes(const BusOptions &options, const Design &design, const Plant &plant,
-                 const std::vector<std::string> &methods)
+/* All methods on one link.  The speaker comes last: its answer lets the plant go on, and then the
+ * others have made the step too. */
+class Nodes
 {
-    const std::string speaker = options.speaker.empty() ? methods.back() : options.speaker;
-    if (std::find(methods.begin(), methods.end(), speaker) == methods.end()) {
-        throw InputError("the speaker " + speaker + " is not among the methods");
+public:
+    Nodes(const BusOptions &options, const Design &design, const Plant &plant,
+          std::vector<std::string> methods)
+        : width_(width_of(options, design, plant, methods.front())),
+          link_(open_link(options.link, plant.tables, width_)), shared_(*link_),
+          watch_(*link_, options.link)
+    {
+        const std::string speaker = options.speaker.empty() ? methods.back() : options.speaker;
+        const auto        place   = std::find(methods.begin(), methods.end(), speaker);
+        if (place == methods.end()) {
+            throw InputError("the speaker " + speaker + " is not among the methods");
+        }
+        std::rotate(place, place + 1, methods.end());
+        for (const std::string &method : methods) {
+            const bool speaks = (method == speaker) && !options.mute;
+            nodes_.push_back(std::make_unique<MethodNode>(options, design, plant, method, width_,
+                                                          *link_, shared_.join(speaks)));
+        }
+        if (!options.mute) {
+            nodes_.back()->speak();
+        }
     }
-    Nodes nodes;
-    for (const std::string &method : methods) {
-        const bool speaks = (method == speaker) && !options.mute;
-        nodes.push_back(std::make_unique<MethodNode>(options, design, plant, method, speaks));
-    }
-    std::stable_partition(nodes.begin(), nodes.end(),
-                          [&](const auto &node) { return node->trace().method != speaker; });
-    return nodes;
-}
 
-bool all_done(const Nodes &nodes)
-{
-    return std::all_of(nodes.begin(), nodes.end(), [](const auto &node) { return node->done(); });
-}
-
-/* Until the plant says that it is over, nothing has come for too long, or a signal. */
-void listen(const Nodes &nodes, std::uint64_t idle_s)
-{
-    std::vector<Link *> links;
-    for (const auto &node : nodes) {
-        links.push_back(&node->link());
-    }
-    blw_port_t *const port    = links.front()->port();
-    std::uint64_t     last_us = blw_port_now_us(port);
-    while (!all_done(nodes) && !bus_interrupted) {
-        const bool over = links.front()->ended(); /* looked at before the last frames are taken */
-        for (const auto &node : nodes) {
-            if (node->advance()) {
-                last_us = blw_port_now_us(port);
+    /* Until the plant says that it is over, nothing has come for too long, or a signal. */
+    void listen(std::uint64_t idle_s)
+    {
+        std::uint64_t last_us = blw_port_now_us(link_->port());
+        while (!done() && !bus_interrupted) {
+            const bool over  = link_->ended(); /* looked at before the last frame is taken */
+            const bool taken = shared_.take();
+            watch_.look();
+            if (advance()) {
+                last_us = blw_port_now_us(link_->port());
+            }
+            if (over) {
+                return;
+            }
+            if (!taken) { /* the clock is looked at when there is time */
+                const std::uint64_t silence_us = blw_port_now_us(link_->port()) - last_us;
+                if ((idle_s > 0U) && (silence_us > (idle_s * SECOND))) {
+                    return;
+                }
+                wait_for({link_.get()}, WAIT_MS);
             }
         }
-        const bool silent = blw_port_now_us(port) > (last_us + (idle_s * SECOND));
-        if (over || ((idle_s > 0U) && silent)) {
-            return;
-        }
-        if (links.front()->handle() >= 0) {
-            wait_for(links, WAIT_MS);
-        } else if (links.front()->down()) {
-            wait_for({}, WAIT_MS);
-        }
     }
-}
+
+    bool heard_a_run() const
+    {
+        return !nodes_.back()->trace().verdicts.empty();
+    }
+
+    const Trace &trace(const std::string &method) const
+    {
+        const auto node = std::find_if(nodes_.begin(), nodes_.end(), [&](const auto &each) {
+            return each->trace().method == method;
+        });
+        return (*node)->trace();
+    }
+
+    Json report() const
+    {
+        Json report = Json::object();
+        for (const auto &node : nodes_) {
+            report[node->trace().method] = node->report();
+        }
+        return report;
+    }
+
+private:
+    bool done() const
+    {
+        return std::all_of(nodes_.begin(), nodes_.end(),
+                           [](const auto &node) { return node->done(); });
+    }
+
+    bool advance()
+    {
+        bool made = false;
+        for (const auto &node : nodes_) {
+            made = node->advance() || made;
+        }
+        return made;
+    }
+
+    std::uint8_t                             width_;
+    std::unique_ptr<Link>                    link_;
+    SharedLink                               shared_;
+    Watch                                    watch_;
+    std::vector<std::unique_ptr<MethodNode>> nodes_;
+};
 
 /* The verdicts of exactly the rows of the log; InputError where one is missing. */
 Trace match(const Trace &trace, const Log &log)
@@ -238,10 +247,7 @@ void score_run(const BusOptions &options, const Design &design, const Nodes &nod
     replay(log, oracle);
     std::vector<Trace> traces;
     for (const std::string &method : methods) {
-        const auto node = std::find_if(nodes.begin(), nodes.end(), [&](const auto &each) {
-            return each->trace().method == method;
-        });
-        traces.push_back(match((*node)->trace(), log));
+        traces.push_back(match(nodes.trace(method), log));
     }
     traces.push_back(oracle.traces().back());
     session.take(log, traces);
@@ -276,15 +282,12 @@ int node_command(const BusOptions &options)
     const std::unique_ptr<Plant>   plant  = load_plant(design);
     const std::vector<std::string> methods =
         options.fusion ? options.run.methods : choose_methods(options.run, design, options.speaker);
-    const Nodes nodes = make_nodes(options, design, *plant, methods);
+    Nodes nodes(options, design, *plant, methods);
     say_listening("node", options.link);
-    listen(nodes, options.idle_s);
+    nodes.listen(options.idle_s);
 
-    Json report = Json::object();
-    for (const auto &node : nodes) {
-        report[node->trace().method] = node->report();
-    }
-    if (nodes.back()->trace().verdicts.empty()) {
+    const Json report = nodes.report();
+    if (!nodes.heard_a_run()) {
         std::cerr << "blw_bus: no plant of model " << design.name << " was heard on "
                   << options.link << "\n";
         return NO_RUN;
@@ -297,9 +300,8 @@ int node_command(const BusOptions &options)
     }
     OutputSet files(options.run.out);
     files.add("node.json", report.dump(2) + "\n");
-    for (const auto &node : nodes) {
-        files.add(node->trace().method + ".csv",
-                  format_trace(node->trace(), design, estimate_digits()));
+    for (const std::string &method : methods) {
+        files.add(method + ".csv", format_trace(nodes.trace(method), design, estimate_digits()));
     }
     files.commit();
     if (options.run.json) {

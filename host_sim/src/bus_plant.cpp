@@ -26,7 +26,7 @@ class BusPlant
 public:
     BusPlant(const BusOptions &options, const Design &design, const Scenario &scenario)
         : options_(options), design_(design), scenario_(scenario), tables_(load_plant(design)),
-          link_(open_link(options.link, tables_->tables, 1U)),
+          link_(open_link(options.link, tables_->tables, 1U)), watch_(*link_, options.link),
           plant_(design, scenario.x0_mean, scenario.x0_covariance, scenario.seed),
           reader_(design.x0), model_(model_id(design.model_sha256))
     {
@@ -107,6 +107,7 @@ private:
     void put(const blw_frame_t &frame)
     {
         (deliver(*link_, frame) ? sent_ : unsent_)++;
+        watch_.look();
     }
 
     void put_all(const std::vector<blw_frame_t> &frames)
@@ -127,6 +128,7 @@ private:
         while ((blw_port_now_us(port) < next_us_) && !bus_interrupted) {
             if (!blw_port_recv(port, &frame)) {
                 wait_for({link_.get()}, WAIT_MS);
+                watch_.look();
                 continue;
             }
             if (reader_.take(frame) && (reader_.status().seq == (k & UINT16_MAX))) {
@@ -143,6 +145,7 @@ private:
     const Scenario        &scenario_;
     std::unique_ptr<Plant> tables_;
     std::unique_ptr<Link>  link_;
+    Watch                  watch_;
     TruePlant              plant_;
     EstimateReader         reader_;
     Log                    log_;

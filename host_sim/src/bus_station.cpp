@@ -20,7 +20,7 @@ public:
                const std::string &method)
         : estimator_(design, plant, method), model_(split_model(estimator_)),
           link_(open_link(options.link, plant.tables, model_.jordan->r)),
-          sensor_(design.sensor_index(options.sensor, "--sensor")),
+          watch_(*link_, options.link), sensor_(design.sensor_index(options.sensor, "--sensor")),
           filter_memory_(BLW_LOCAL_MEM(design.n, model_.jordan->r)),
           memory_(BLW_STATION_MEM(design.n, design.l))
     {
@@ -41,7 +41,9 @@ public:
         std::uint64_t last_us = blw_port_now_us(link_->port());
         blw_frame_t   frame;
         while (!ended_ && !bus_interrupted) {
-            if (blw_port_recv(link_->port(), &frame)) {
+            const bool received = blw_port_recv(link_->port(), &frame);
+            watch_.look();
+            if (received) {
                 last_us = frame.t_us;
                 take(frame);
                 continue;
@@ -89,6 +91,7 @@ private:
     Estimator                estimator_; /* only its tables */
     const blw_lasso_model_t &model_;
     std::unique_ptr<Link>    link_;
+    Watch                    watch_;
     std::size_t              sensor_;
     std::vector<blw_real_t>  filter_memory_, memory_;
     blw_local_t              filter_{};

@@ -6,6 +6,7 @@
 #include "error.h"
 #include <cerrno>
 #include <cstring>
+#include <iostream>
 #include <poll.h>
 #ifdef BLW_WITH_LCM
 #include "blw_port_lcm.h"
@@ -19,44 +20,51 @@ namespace
 const int           ROOM_MS    = 1;
 const int           ROOM_TRIES = 1000;
 const unsigned long ID_DIGITS  = 8U;
+const char *const   LOST       = "link lost";
 
 [[noreturn]] void refuse(const std::string &where, int error)
 {
     throw InputError(where + ": cannot be opened: " + std::strerror(error));
 }
 
-class CanLink : public Link
+/* What the links have in common: a port of C that is closed in the end. */
+template <class Port, void (*CLOSE)(Port *)> class PortLink : public Link
+{
+public:
+    ~PortLink() override
+    {
+        CLOSE(&port_);
+    }
+    blw_port_t *port() override
+    {
+        return &port_.base;
+    }
+
+protected:
+    Port port_{};
+};
+
+class CanLink : public PortLink<blw_port_socketcan_t, blw_port_socketcan_close>
 {
 public:
     CanLink(const std::string &where, const std::string &interface, bool can_fd) : can_fd_(can_fd)
     {
-        const int error = blw_port_socketcan_open(&can_, interface.c_str(), can_fd);
+        const int error = blw_port_socketcan_open(&port_, interface.c_str(), can_fd);
         if (error != 0) {
             refuse(where, error);
         }
     }
-    ~CanLink() override
-    {
-        blw_port_socketcan_close(&can_);
-    }
-    CanLink(const CanLink &)            = delete;
-    CanLink &operator=(const CanLink &) = delete;
-
-    blw_port_t *port() override
-    {
-        return &can_.base;
-    }
     int handle() const override
     {
-        return blw_port_socketcan_handle(&can_);
+        return blw_port_socketcan_handle(&port_);
     }
-    bool down() const override
+    const char *trouble() const override
     {
-        return can_.down || can_.bus_off;
+        return port_.down ? LOST : (port_.bus_off ? "bus off" : nullptr);
     }
     Json counters() const override
     {
-        const blw_socketcan_counters_t &c = can_.counters;
+        const blw_socketcan_counters_t &c = port_.counters;
         return {{"sent", c.sent},       {"received", c.received}, {"foreign", c.foreign},
                 {"no_room", c.no_room}, {"overruns", c.overruns}, {"bus_off", c.bus_off},
                 {"errors", c.errors},   {"lost", c.lost}};
@@ -67,126 +75,86 @@ public:
     }
 
 private:
-    blw_port_socketcan_t can_{};
-    bool                 can_fd_;
+    bool can_fd_;
 };
 
-class SerialLink : public Link
+class SerialLink : public PortLink<blw_port_serial_t, blw_port_serial_close>
 {
 public:
     SerialLink(const std::string &where, const std::string &place)
     {
-        const int error = blw_port_serial_open(&serial_, place.c_str());
+        const int error = blw_port_serial_open(&port_, place.c_str());
         if (error != 0) {
             refuse(where, error);
         }
     }
-    ~SerialLink() override
-    {
-        blw_port_serial_close(&serial_);
-    }
-    SerialLink(const SerialLink &)            = delete;
-    SerialLink &operator=(const SerialLink &) = delete;
-
-    blw_port_t *port() override
-    {
-        return &serial_.base;
-    }
     int handle() const override
     {
-        return blw_port_serial_handle(&serial_);
+        return blw_port_serial_handle(&port_);
     }
-    bool down() const override
+    const char *trouble() const override
     {
-        return serial_.down;
+        return port_.down ? LOST : nullptr;
     }
     Json counters() const override
     {
-        const blw_serial_counters_t &c = serial_.counters;
+        const blw_serial_counters_t &c = port_.counters;
         return {{"sent", c.sent},       {"received", c.received},
                 {"no_room", c.no_room}, {"refused", c.refused},
-                {"lost", c.lost},       {"malformed", serial_.slcan.malformed}};
+                {"lost", c.lost},       {"malformed", port_.slcan.malformed}};
     }
-
-private:
-    blw_port_serial_t serial_{};
 };
 
-class ReplayLink : public Link
+class ReplayLink : public PortLink<blw_port_replay_t, blw_port_replay_close>
 {
 public:
     ReplayLink(const std::string &where, const std::string &path)
     {
-        const int error = blw_port_replay_open(&replay_, path.c_str());
+        const int error = blw_port_replay_open(&port_, path.c_str());
         if (error != 0) {
             refuse(where, error);
         }
-    }
-    ~ReplayLink() override
-    {
-        blw_port_replay_close(&replay_);
-    }
-    ReplayLink(const ReplayLink &)            = delete;
-    ReplayLink &operator=(const ReplayLink &) = delete;
-
-    blw_port_t *port() override
-    {
-        return &replay_.base;
     }
     int handle() const override
     {
         return -1;
     }
-    bool down() const override
+    const char *trouble() const override
     {
-        return false;
+        return nullptr;
     }
     bool ended() const override
     {
-        return replay_.ended;
+        return port_.ended;
     }
     Json counters() const override
     {
-        return {{"skipped", replay_.skipped}};
+        return {{"skipped", port_.skipped}};
     }
-
-private:
-    blw_port_replay_t replay_{};
 };
 
 #ifdef BLW_WITH_LCM
-class LcmLink : public Link
+class LcmLink : public PortLink<blw_port_lcm_t, blw_port_lcm_close>
 {
 public:
     LcmLink(const std::string &where, std::string url, const blw_plant_t &plant, std::uint8_t width)
         : url_(std::move(url))
     {
-        if (!blw_port_lcm_open(&lcm_, url_.empty() ? nullptr : url_.c_str(), &plant, width)) {
+        if (!blw_port_lcm_open(&port_, url_.empty() ? nullptr : url_.c_str(), &plant, width)) {
             throw InputError(where + ": cannot be opened: LCM refuses it");
         }
     }
-    ~LcmLink() override
-    {
-        blw_port_lcm_close(&lcm_);
-    }
-    LcmLink(const LcmLink &)            = delete;
-    LcmLink &operator=(const LcmLink &) = delete;
-
-    blw_port_t *port() override
-    {
-        return &lcm_.base;
-    }
     int handle() const override
     {
-        return blw_port_lcm_handle(&lcm_);
+        return blw_port_lcm_handle(&port_);
     }
-    bool down() const override
+    const char *trouble() const override
     {
-        return lcm_.down;
+        return port_.down ? LOST : nullptr;
     }
     Json counters() const override
     {
-        const blw_lcm_counters_t &c = lcm_.counters;
+        const blw_lcm_counters_t &c = port_.counters;
         return {{"sent", c.sent},
                 {"received", c.received},
                 {"malformed", c.malformed},
@@ -199,12 +167,11 @@ public:
     void describe(const std::string &method, const blw_node_report_t &report) override
     {
         method_ = method;
-        blw_port_lcm_describe(&lcm_, method_.c_str(), &report);
+        blw_port_lcm_describe(&port_, method_.c_str(), &report);
     }
 
 private:
-    std::string    url_, method_;
-    blw_port_lcm_t lcm_{};
+    std::string url_, method_;
 };
 #endif
 
@@ -256,13 +223,23 @@ void wait_for(const std::vector<Link *> &links, int time_ms)
     (void)::poll(waiting.data(), static_cast<nfds_t>(waiting.size()), time_ms);
 }
 
+void Watch::look()
+{
+    const char *const now = link_.trouble();
+    if (now != told_) {
+        std::cerr << "blw_bus: " << where_ << ": " << ((now != nullptr) ? now : "back")
+                  << std::endl;
+        told_ = now;
+    }
+}
+
 bool deliver(Link &link, const blw_frame_t &frame)
 {
     for (int tries = 0; tries < ROOM_TRIES; tries++) {
         if (blw_port_send(link.port(), &frame)) {
             return true;
         }
-        if (link.down()) {
+        if (link.trouble() != nullptr) {
             return false;
         }
         (void)::poll(nullptr, 0U, ROOM_MS);

@@ -20,13 +20,18 @@ namespace sim
 class Link
 {
 public:
-    virtual ~Link()            = default;
+    Link()                        = default;
+    virtual ~Link()               = default;
+    Link(const Link &)            = delete;
+    Link &operator=(const Link &) = delete;
+
     virtual blw_port_t *port() = 0;
     /** For poll(); -1 if there is nothing to wait for. */
     virtual int handle() const = 0;
-    /** The link is lost at present. */
-    virtual bool down() const     = 0;
-    virtual Json counters() const = 0;
+    /** What is wrong with the link at present, always the same words for the same; nullptr if
+     *  nothing is. */
+    virtual const char *trouble() const  = 0;
+    virtual Json        counters() const = 0;
     /** Nothing will ever come again. */
     virtual bool ended() const
     {
@@ -37,8 +42,22 @@ public:
     {
         return BLW_WIRE_CLASSIC;
     }
-    /** Whose reports are sent, for links that say more than frames do.  Both outlive the link. */
+    /** Whose reports are sent, for links that say more than frames do; the report outlives the
+     *  link. */
     virtual void describe(const std::string & /*method*/, const blw_node_report_t & /*report*/) {}
+};
+
+/** One line on standard error when the link gets into trouble, and one when it is back. */
+class Watch
+{
+public:
+    Watch(const Link &link, std::string where) : link_(link), where_(std::move(where)) {}
+    void look();
+
+private:
+    const Link &link_;
+    std::string where_;
+    const char *told_ = nullptr;
 };
 
 /** InputError if it cannot be opened.
