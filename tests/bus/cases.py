@@ -6,19 +6,28 @@ told by file names: cases.py BLW_BUS DESIGN OTHER_DESIGN SCENARIO_FOLDER OUT TRA
 """
 
 import json
+import socket
+import struct
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from hub import Hub
+
 LINKS = {"can": ("can:vcan0", "can:vcan1"), "canfd": ("canfd:vcan0", "canfd:vcan1"),
          "lcm": ("lcm:udpm://239.255.76.67:7667?ttl=0", "lcm:udpm://239.255.76.67:7668?ttl=0")}
 FAULTS = ("babble", "crc", "stale", "early", "duplicate", "sync", "garbage")
-FRAMES_PER_STEP = {"can": 6, "canfd": 3, "lcm": 3}  # sync, 1 input, 4 measurements
-TIMEOUT_S = 120
+FRAMES_PER_STEP = {"can": 6, "canfd": 3, "lcm": 3, "slcan": 6}  # sync, 1 input, 4 measurements
+PACE_US = 3000
+TIMEOUT_S = 400
 #: A deadline that no busy machine misses; the next sync ends a step that lacks a frame anyway.
 PATIENT_US = 20_000_000
+CAN_FRAME = struct.Struct("=IB3x8s")  # struct can_frame: identifier, length, data
+ANSWERED = 0x281                      # identifier of the last frame of an answer of four sensors
+ERROR, BUS_OFF, RESTARTED = 0x2000_0000, 0x40, 0x100  # CAN_ERR_... of linux/can/error.h
 
 
 class Bus:
@@ -26,8 +35,13 @@ class Bus:
 
     def __init__(self, program: str, design: str, scenarios: Path, out: Path, transport: str):
         self.program, self.design, self.scenarios, self.out = program, design, scenarios, out
-        self.link, self.sensor_link = LINKS[transport]
         self.transport = transport
+        if transport == "slcan":
+            folder = Path(tempfile.mkdtemp(prefix="blw."))  # the name of a socket has to be short
+            self.hubs = [Hub(folder / side) for side in ("node", "sensor")]
+            self.link, self.sensor_link = (f"slcan:unix:{hub.path}" for hub in self.hubs)
+        else:
+            self.link, self.sensor_link = LINKS[transport]
 
     def start(self, part: str, *arguments: object, link: str = "") -> subprocess.Popen:
         """A process that is on the bus when this returns."""
@@ -76,14 +90,13 @@ def lockstep(bus: Bus, _: int) -> dict:
 
 
 def paced(bus: Bus, frames: int) -> dict:
-    """So many frames at 2000 a second; nobody waits for anybody."""
+    """So many frames, a step every PACE_US; nobody waits for anybody."""
     steps = -(-frames // FRAMES_PER_STEP[bus.transport])
     scenario = bus.out / "paced.toml"
     text = (bus.scenarios / "benign.toml").read_text()
     scenario.write_text(text.replace("steps = 400", f"steps = {steps}"))
     node = bus.node("paced", methods="kalman", speaker="kalman")
-    pace = 500 * FRAMES_PER_STEP[bus.transport]
-    plant = bus.start("plant", scenario, "--out", bus.out / "paced.plant", "--pace-us", pace)
+    plant = bus.start("plant", scenario, "--out", bus.out / "paced.plant", "--pace-us", PACE_US)
     return bus.results("paced", node, plant) | {"steps": steps}
 
 
@@ -139,20 +152,52 @@ def split(method: str) -> Callable[[Bus, int], dict]:
     return case
 
 
-def gateway(bus: Bus, _: int) -> dict:
-    """The sensor's frames are changed on their way."""
-    node = bus.node("gateway")
-    attacker = bus.start("attack", bus.scenarios / "bias.toml", "--sensor-link", bus.sensor_link)
-    plant = bus.plant("gateway", "bias.toml", link=bus.sensor_link)
-    return bus.results("gateway", node, plant, attacker)
+def gateway(kind: str) -> Callable[[Bus, int], dict]:
+    """The sensor's frames are changed, replayed, delayed or withheld on their way."""
+
+    def case(bus: Bus, _: int) -> dict:
+        name = f"gateway_{kind}"
+        node = bus.node(name, deadline_us=100_000 if kind == "drop" else PATIENT_US)
+        scenario = f"{kind}.toml"
+        attacker = bus.start("attack", bus.scenarios / scenario, "--sensor-link", bus.sensor_link)
+        plant = bus.plant(name, scenario, link=bus.sensor_link)
+        return bus.results(name, node, plant, attacker)
+
+    return case
 
 
-def suppressed(bus: Bus, _: int) -> dict:
-    """The sensor's frames are withheld on their way."""
-    node = bus.node("suppressed", deadline_us=100_000)
-    attacker = bus.start("attack", bus.scenarios / "drop.toml", "--sensor-link", bus.sensor_link)
-    plant = bus.plant("suppressed", "drop.toml", link=bus.sensor_link)
-    return bus.results("suppressed", node, plant, attacker)
+#: Transport -> recorder and player of its own, without the file.
+RECORDERS = {"can": ["candump", "-L", "vcan0"],
+             "lcm": ["/usr/bin/lcm-logger", "--quiet", "--force", "--lcm-url=URL"]}
+PLAYERS = {"can": ["canplayer", "vcan0=vcan0", "vcan0=can0", "-t", "-g", "1", "-I"],
+           "lcm": ["lcm-logplayer", "--speed=SPEED", "--lcm-url=URL"]}
+#: lcm-logplayer: a recorded run took milliseconds a step, an exported one takes the model's dt.
+SPEEDS = {"recorded": "0.5", "exported": "20"}
+
+
+def stock(bus: Bus, _: int) -> dict:
+    """The transport's own recorder listens to a run; its own player plays that and our export."""
+    url = bus.link.partition(":")[2]
+    recorder, player = ([word.replace("URL", url) for word in command[bus.transport]]
+                        for command in (RECORDERS, PLAYERS))
+    files = {"recorded": bus.out / f"recorded.{bus.transport}",
+             "exported": bus.scenarios / f"exported.{bus.transport}"}
+    log = files["recorded"]
+    with log.open("wb") as file:
+        heard = subprocess.Popen([*recorder, *([log] if bus.transport == "lcm" else [])],
+                                 stdout=file)
+        time.sleep(0.5)  # it does not say when it is on the bus
+        reports = {"stock": bus.results("stock", bus.node("stock"),
+                                        bus.plant("stock", "benign.toml"))}
+        time.sleep(0.5)
+        heard.terminate()
+        heard.wait()
+    for name, file in files.items():
+        node = bus.node(name, idle_s=3)
+        subprocess.run([*(word.replace("SPEED", SPEEDS[name]) for word in player), file],
+                       check=True, stdout=subprocess.DEVNULL)
+        reports[name] = bus.results(name, node)
+    return reports
 
 
 def other_model(bus: Bus, _: int, other: str) -> dict:
@@ -165,17 +210,51 @@ def other_model(bus: Bus, _: int, other: str) -> dict:
 
 
 def link_lost(bus: Bus, _: int) -> dict:
-    """The interface goes down for a second in the middle of a run."""
-    interface = "lo" if bus.transport == "lcm" else "vcan0"
+    """The interface goes down, or the line is hung up, for a second in the middle of a run."""
     node = bus.node("link_lost", "--period-us", 50_000, deadline_us=25_000)
     plant = bus.plant("link_lost", "short.toml", "--pace-us", 50_000)
     time.sleep(1.5)
+    if bus.transport == "slcan":
+        bus.hubs[0].close()
+        time.sleep(1.0)
+        bus.hubs[0].open()
+    else:
+        interface_down("lo" if bus.transport == "lcm" else "vcan0")
+    return bus.results("link_lost", node, plant)
+
+
+def interface_down(interface: str) -> None:
+    """For a second."""
     for state, pause in (("down", 1.0), ("up", 0.0)):
         subprocess.run(["ip", "link", "set", interface, state], check=True)
         time.sleep(pause)
-    if bus.transport == "lcm":
+    if interface == "lo":
         subprocess.run(["ip", "route", "add", "224.0.0.0/4", "dev", "lo"], check=True)
-    return bus.results("link_lost", node, plant)
+
+
+def bus_off(bus: Bus, _: int) -> dict:
+    """The controller says that it is off the bus, and that it has been restarted.
+
+    vcan has no controller, but passes on the error frames that somebody else sends.
+    """
+    with socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW) as controller:
+        controller.bind((bus.link.partition(":")[2],))
+        node = bus.node("bus_off")
+        plant = bus.plant("bus_off", "benign.toml", "--pace-us", 10_000)
+        while CAN_FRAME.unpack(controller.recv(CAN_FRAME.size))[0] != ANSWERED:
+            pass  # then nobody sends until it is time for the next step
+        for what in (BUS_OFF, RESTARTED):
+            controller.send(CAN_FRAME.pack(ERROR | what, 8, bytes(8)))
+            time.sleep(0.003)
+    return bus.results("bus_off", node, plant)
+
+
+def terminal(bus: Bus, _: int) -> dict:
+    """Node and plant on pseudo-terminals, as on serial lines."""
+    node_line, plant_line = (f"slcan:{bus.hubs[0].pty()}" for _ in range(2))
+    node = bus.start("node", "--out", bus.out / "terminal", "--method", "kalman,guard",
+                     "--speaker", "guard", "--deadline-us", PATIENT_US, link=node_line)
+    return bus.results("terminal", node, bus.plant("terminal", "benign.toml", link=plant_line))
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -185,10 +264,16 @@ def main(arguments: Sequence[str]) -> None:
     cases = {"lockstep": lockstep, "paced": paced}
     cases |= {f"split_{method}": split(method) for method in ("lasso", "canonical")}
     if transport != "canfd":  # the same code but for the frames
-        cases |= {"restart": restart, "gateway": gateway, "intruder": intruder,
-                  "suppressed": suppressed, "link_lost": link_lost,
+        cases |= {"restart": restart, "gateway_bias": gateway("bias"), "link_lost": link_lost}
+    if transport in ("can", "lcm"):  # slcan: the same frames as can
+        cases |= {f"gateway_{kind}": gateway(kind) for kind in ("replay", "delay", "drop")}
+        cases |= {"intruder": intruder, "stock": stock,
                   "other_model": lambda bus, n: other_model(bus, n, other)}
         cases |= {name: fault(name) for name in FAULTS}
+    if transport == "can":
+        cases |= {"bus_off": bus_off}
+    if transport == "slcan":
+        cases |= {"terminal": terminal}
     print(json.dumps({name: case(bus, int(frames)) for name, case in cases.items()}))
 
 

@@ -17,6 +17,9 @@ from blw.build import ROOT, bus, simulator
 
 HERE = Path(__file__).parent
 NO_SUCH_BUS = 77
+#: Transport -> what has such a bus; SLCAN needs no more than sockets.
+IN_UML = (HERE / "in_uml.sh", "-t", "800", "--")
+WITHIN = {"lcm": (HERE / "in_netns.sh",), "can": IN_UML, "canfd": IN_UML}
 MODEL = ROOT / "host_sim" / "models" / "pendulum_physical.toml"
 OTHER_MODEL = ROOT / "host_sim" / "models" / "pendulum.toml"
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT / "tools")}
@@ -34,6 +37,9 @@ sensor = "cart2"
 from   = 100
 to     = 200
 """
+#: Scenario -> attack on its sensor.
+ATTACKS = {"benign": "", "bias": 'kind = "bias"\nvalue = 5.0', "drop": 'kind = "drop"',
+           "replay": 'kind = "replay"\nvalue = 6.0', "delay": 'kind = "delay"\nvalue = 0.3'}
 
 
 @dataclass
@@ -76,12 +82,15 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Prepared:
     (folder / "short.toml").write_text(BENIGN.replace("steps = 400", "steps = 120"))
     made = Prepared(folder / f"{MODEL.stem}.json", folder / f"{OTHER_MODEL.stem}.json", folder,
                     folder / "inproc")
-    for name, attack in (("benign", ""), ("bias", ATTACK.format(what='kind = "bias"\nvalue = 5.0')),
-                         ("drop", ATTACK.format(what='kind = "drop"'))):
+    for name, what in ATTACKS.items():
         scenario = folder / f"{name}.toml"
-        scenario.write_text(BENIGN + attack)
+        scenario.write_text(BENIGN + (ATTACK.format(what=what) if what else ""))
         done = call([simulator("f32"), "run", scenario, "--design", made.design, "--method",
                      "guard", "--out", made.inproc / name])
+        assert done.returncode == 0, done.stderr
+    for log_format, transport in (("candump", "can"), ("lcm", "lcm")):
+        done = call([sys.executable, "-m", "blw", "export", made.inproc / "benign", "--format",
+                     log_format, "--out", folder / f"exported.{transport}"])
         assert done.returncode == 0, done.stderr
     return made
 
@@ -102,11 +111,9 @@ def record(prepared: Prepared,
     def made(transport: str) -> Recorded:
         out = tmp_path_factory.mktemp(transport)
         frames = os.environ.get("BULWARK_FRAMES", "10000")
-        within = ([HERE / "in_netns.sh"] if transport == "lcm"
-                  else [HERE / "in_uml.sh", "-t", "800", "--"])
         return Recorded(transport, out, call([
-            *within, "/usr/bin/env", "python3", HERE / "cases.py", bus("f32"), prepared.design,
-            prepared.other, prepared.scenarios, out, transport, frames]))
+            *WITHIN.get(transport, ()), "/usr/bin/env", "python3", HERE / "cases.py", bus("f32"),
+            prepared.design, prepared.other, prepared.scenarios, out, transport, frames]))
 
     return made
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Plant, nodes and attackers on LCM, CAN and CAN FD: counts and bits, never times.
+"""Plant, nodes and attackers on LCM, CAN, CAN FD and SLCAN: counts and bits, never times.
 
 BULWARK_FRAMES is the length of the paced run, 10000 if it is not set.
 """
 
 import csv
+import json
 from pathlib import Path
 
 import pytest
@@ -33,7 +34,12 @@ def clean(node: dict) -> bool:
     return all(count == 0 for name, count in node.items() if name not in harmless)
 
 
-@on("lcm", "can", "canfd")
+def told(said: str) -> list[str]:
+    """What a process tells of its link; LCM itself adds lines of its own."""
+    return [line.rpartition(": ")[2] for line in said.splitlines() if line.startswith("blw_bus: ")]
+
+
+@on("lcm", "can", "canfd", "slcan")
 @pytest.mark.parametrize("method", ["kalman", "guard"])
 def test_node_on_a_bus_given_no_fault_yields_the_bits_of_one_process(
         recorded: Recorded, prepared: Prepared, method: str) -> None:
@@ -41,7 +47,7 @@ def test_node_on_a_bus_given_no_fault_yields_the_bits_of_one_process(
     assert written == (prepared.inproc / "benign" / f"{method}.csv").read_bytes()
 
 
-@on("lcm", "can", "canfd")
+@on("lcm", "can", "canfd", "slcan")
 def test_paced_run_loses_and_reorders_nothing(recorded: Recorded) -> None:
     paced = recorded.case("paced")
     node = paced["node"]["kalman"]
@@ -52,7 +58,7 @@ def test_paced_run_loses_and_reorders_nothing(recorded: Recorded) -> None:
     assert paced["plant"]["unsent"] == 0
 
 
-@on("lcm", "can")
+@on("lcm", "can", "slcan")
 def test_restarted_node_catches_up(recorded: Recorded) -> None:
     again = recorded.case("restart")
     assert again["status"] == [0, 0, 0]
@@ -88,7 +94,7 @@ def test_intruder_silences_his_victim_but_does_not_speak_for_it(recorded: Record
         assert abs(float(row["cart_m"]) - float(true["x:cart_m"])) < FAR
 
 
-@on("lcm", "can", "canfd")
+@on("lcm", "can", "canfd", "slcan")
 @pytest.mark.parametrize("method", ["lasso", "canonical"])
 def test_split_deployment_yields_the_bits_of_the_central_node(recorded: Recorded,
                                                               method: str) -> None:
@@ -100,21 +106,40 @@ def test_split_deployment_yields_the_bits_of_the_central_node(recorded: Recorded
     assert clean(done["node"][method])
 
 
-@on("lcm", "can")
-def test_gateway_attacks_as_in_one_process(recorded: Recorded, prepared: Prepared) -> None:
-    there = rows(recorded.out / "gateway" / "guard.csv")
-    here = rows(prepared.inproc / "bias" / "guard.csv")
+def assert_attacked_as_in_one_process(recorded: Recorded, prepared: Prepared, kind: str) -> None:
+    """The same exclusions, and estimates but for the rounding of y before the attacker sees it."""
+    there = rows(recorded.out / f"gateway_{kind}" / "guard.csv")
+    here = rows(prepared.inproc / kind / "guard.csv")
     assert [row["excluded"] for row in there] == [row["excluded"] for row in here]
-    assert any(row["excluded"] == "cart2" for row in there[100:200])
     for one, other in zip(there, here, strict=True):
         assert float(one["cart_m"]) == pytest.approx(float(other["cart_m"]), abs=1e-5)
+    log = rows(prepared.inproc / kind / "log.csv")
+    attacked = [row for row in log if float(row["a:cart2"] or 0.0)]
+    said = json.loads(recorded.case(f"gateway_{kind}")["said"][2])
+    assert said["forged"] == len(attacked) >= 98  # what is repeated may be the same by chance
+    assert said["withheld"] == 0
+
+
+@on("lcm", "can", "slcan")
+def test_gateway_that_adds_a_bias_attacks_as_in_one_process(recorded: Recorded,
+                                                            prepared: Prepared) -> None:
+    assert_attacked_as_in_one_process(recorded, prepared, "bias")
+    assert any(row["excluded"] == "cart2"
+               for row in rows(recorded.out / "gateway_bias" / "guard.csv")[100:200])
+
+
+@on("lcm", "can")
+@pytest.mark.parametrize("kind", ["replay", "delay"])
+def test_gateway_that_repeats_the_past_attacks_as_in_one_process(
+        recorded: Recorded, prepared: Prepared, kind: str) -> None:
+    assert_attacked_as_in_one_process(recorded, prepared, kind)
 
 
 @on("lcm", "can")
 def test_suppressed_sensor_is_missing_as_in_one_process(recorded: Recorded,
                                                        prepared: Prepared) -> None:
-    node = recorded.case("suppressed")["node"]["guard"]
-    there = rows(recorded.out / "suppressed" / "guard.csv")
+    node = recorded.case("gateway_drop")["node"]["guard"]
+    there = rows(recorded.out / "gateway_drop" / "guard.csv")
     here = rows(prepared.inproc / "drop" / "guard.csv")
     assert [row["status"] for row in there] == [row["status"] for row in here]
     assert sum("missing" in row["status"] for row in there) == 100
@@ -129,7 +154,19 @@ def test_node_of_another_model_refuses(recorded: Recorded) -> None:
     assert clean(done["node"]["guard"])
 
 
-@on("lcm", "can")
+@on("slcan")
+@pytest.mark.parametrize("method", ["kalman", "guard"])
+def test_node_on_a_serial_line_yields_the_bits_of_one_process(
+        recorded: Recorded, prepared: Prepared, method: str) -> None:
+    done = recorded.case("terminal")
+    assert done["status"] == [0, 0]
+    assert clean(done["node"][method])
+    assert done["node"][method]["link"]["malformed"] == 0
+    written = (recorded.out / "terminal" / f"{method}.csv").read_bytes()
+    assert written == (prepared.inproc / "benign" / f"{method}.csv").read_bytes()
+
+
+@on("lcm", "can", "slcan")
 def test_lost_link_is_reported_and_recovered(recorded: Recorded) -> None:
     done = recorded.case("link_lost")
     node = done["node"]["guard"]
@@ -139,3 +176,19 @@ def test_lost_link_is_reported_and_recovered(recorded: Recorded) -> None:
     assert done["plant"]["link"]["lost"] >= 1
     assert node["steps"] - node["blind"] >= 60
     assert "blind" not in rows(recorded.out / "link_lost" / "guard.csv")[-1]["status"]
+    for said in done["said"]:
+        assert told(said) == ["link lost", "back"]
+
+
+@on("can")
+def test_bus_off_is_reported_and_recovered(recorded: Recorded, prepared: Prepared) -> None:
+    done = recorded.case("bus_off")
+    assert done["status"] == [0, 0]
+    for link in (done["node"]["guard"]["link"], done["plant"]["link"]):
+        assert link["bus_off"] == 1
+        assert link["lost"] == link["errors"] == 0
+    for said in done["said"]:
+        assert told(said) == ["bus off", "back"]
+    assert clean(done["node"]["guard"])
+    written = (recorded.out / "bus_off" / "guard.csv").read_bytes()
+    assert written == (prepared.inproc / "benign" / "guard.csv").read_bytes()

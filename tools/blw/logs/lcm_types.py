@@ -16,8 +16,8 @@ from blw.errors import BulwarkError
 
 SOURCE = ROOT / "host_sim" / "lcm" / "bulwark.lcm"
 
-CHANNELS = {"measurement": "BLW_MEASUREMENT", "input": "BLW_INPUT", "estimate": "BLW_ESTIMATE",
-            "truth": "BLW_TRUTH", "alarm": "BLW_ALARM"}
+CHANNELS = {"sync": "BLW_SYNC", "measurement": "BLW_MEASUREMENT", "input": "BLW_INPUT",
+            "estimate": "BLW_ESTIMATE", "truth": "BLW_TRUTH", "alarm": "BLW_ALARM"}
 
 
 @cache

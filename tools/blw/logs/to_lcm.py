@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A run as an LCM event log: lcm-logplayer sends it as plant and node would have."""
+"""A run as an LCM event log: lcm-logplayer sends it as plant and node would have.
+
+A node that hears it makes the same steps; `utime` counts from the initial state.
+"""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -8,18 +11,20 @@ from typing import Any
 import lcm
 import numpy as np
 
+from blw import wire
 from blw.logs.lcm_types import CHANNELS, types
 from blw.logs.words import outcome_and_flags
 from blw.report.data import Recording, Track
 
 
 def write(recording: Recording, track: Track, path: Path) -> None:
-    """Every step: input, truth, measurement, estimate, and an alarm where there is news."""
+    """Every step: sync, input, truth, measurement, estimate, and an alarm where there is news."""
+    model = wire.model_id(str(recording.summary.get("model_sha256", "")))
     log = lcm.EventLog(str(path), "w", overwrite=True)
     try:
         for row in range(len(recording.k)):
             utime = round(1e6 * float(recording.t_s[row] - min(recording.t_s[0], 0.0)))
-            for kind, fields in _messages(recording, track, row):
+            for kind, fields in _messages(recording, track, row, model):
                 log.write_event(utime, CHANNELS[kind],
                                 _encoded(kind, {"utime": utime, **fields}))
     finally:
@@ -33,12 +38,14 @@ def _encoded(kind: str, fields: dict[str, Any]) -> bytes:
     return message.encode()
 
 
-def _messages(recording: Recording, track: Track,
-              row: int) -> Iterator[tuple[str, dict[str, Any]]]:
+def _messages(recording: Recording, track: Track, row: int,
+              model: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    yield "sync", {"k": int(recording.k[row]), "model": model}
     seq, m = {"seq": int(recording.k[row])}, {"m": len(recording.sensors)}
-    u, y = recording.u[row], recording.y[row]
-    if len(recording.inputs) > 0:
-        yield "input", seq | {"l": len(u), "u": np.nan_to_num(u).tolist()}
+    y = recording.y[row]
+    if len(recording.inputs) > 0 and row > 0:  # the one that led here
+        u = np.nan_to_num(recording.u[row - 1]).tolist()
+        yield "input", {"seq": int(recording.k[row - 1]), "l": len(u), "u": u}
     if recording.x is not None:
         a = np.zeros(len(y)) if recording.a is None else recording.a[row]
         x = recording.x[row].tolist()
