@@ -40,7 +40,7 @@ typedef struct blw_port_socketcan {
 
 /** Open an interface.  @param can_fd also CAN FD frames
  *  @return 0, or errno with nothing left open. */
-int  blw_port_socketcan_open(blw_port_socketcan_t *self, const char *interface, bool can_fd);
+int blw_port_socketcan_open(blw_port_socketcan_t *self, const char *interface, bool can_fd);
 /** Take an open socket over, such as one end of a pair that carries struct can_frame and
  *  canfd_frame.  It is not opened again. */
 int  blw_port_socketcan_adopt(blw_port_socketcan_t *self, int fd, bool can_fd);
