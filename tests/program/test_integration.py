@@ -26,19 +26,24 @@ def source_list(root, tmp_path):
 
 @pytest.fixture
 def header(bulwark, tmp_path):
-    """The amalgamation, under the name that the consumer of tests/install includes."""
-    path = tmp_path / "include" / "blw" / "blw_kalman.h"
-    path.parent.mkdir(parents=True)
+    """The amalgamation."""
+    path = tmp_path / "include" / "bulwark.h"
     done = bulwark("amalgamate", "--out", path)
     assert done.returncode == 0, done.stderr
     return path
 
 
+@pytest.fixture
+def library(header):
+    """The one source file that it takes."""
+    path = header.with_name("library.c")
+    path.write_text("#define BLW_IMPLEMENTATION\n#include <bulwark.h>\n")
+    return path
+
+
 @pytest.mark.parametrize("language, main", [("c", "main.c"), ("c++", "main.cpp")])
-def test_amalgamation_given_a_consumer_builds_and_runs(root, header, tmp_path, language, main):
-    library = tmp_path / "library.c"
-    library.write_text("#define BLW_IMPLEMENTATION\n#include <blw/blw_kalman.h>\n")
-    include = ["-I", header.parents[1]]
+def test_amalgamation_given_a_consumer_builds_and_runs(root, library, tmp_path, language, main):
+    include = ["-I", library.parent]
     compiled(*COMPILERS["c"], *STRICT, *include, "-c", library, "-o", tmp_path / "library.o")
     consumer = root / "tests" / "install" / "consumer" / main
     compiled(*COMPILERS[language], *STRICT, *include, consumer, tmp_path / "library.o", "-lm", "-o",
@@ -46,10 +51,17 @@ def test_amalgamation_given_a_consumer_builds_and_runs(root, header, tmp_path, l
     assert subprocess.call([tmp_path / "consumer"]) == 0
 
 
-def test_amalgamation_given_every_public_symbol_has_it(root, header, tmp_path, bulwark):
-    library = tmp_path / "library.c"
-    library.write_text("#define BLW_IMPLEMENTATION\n#include <blw/blw_kalman.h>\n")
-    compiled("gcc", "-std=c99", "-ffp-contract=off", "-I", header.parents[1], "-c", library, "-o",
+def test_amalgamation_given_a_generated_model_builds_firmware_from_both(root, library, tmp_path):
+    """The model, as it is, knows the library's headers by their own names."""
+    models = root / "lib" / "models"
+    compiled(*COMPILERS["c"], *STRICT, "-I", library.parent, "-I", models, library,
+             models / "pendulum_physical_model.c", root / "port" / "firmware" / "bare.c", "-lm",
+             "-o", tmp_path / "firmware")
+    assert subprocess.call([tmp_path / "firmware"]) == 0
+
+
+def test_amalgamation_given_every_public_symbol_has_it(root, library, tmp_path):
+    compiled("gcc", "-std=c99", "-ffp-contract=off", "-I", library.parent, "-c", library, "-o",
              tmp_path / "one.o")
     parts = []
     for source in source_list(root, tmp_path):

@@ -2,8 +2,10 @@
 """`bulwark amalgamate`: the whole library as one header file.
 
 Like other single-header libraries: every file that uses it includes the header, and exactly one
-defines BLW_IMPLEMENTATION before it.  Static functions of different files may share a name; each
-file's names get the file's own name behind them.
+defines BLW_IMPLEMENTATION before it.  Generated models include the library's headers by their own
+names, so beside the one header stands the folder blw/ with those names, each a line that includes
+the one.  Static functions of different files may share a name; each file's names get the file's own
+name behind them.
 """
 
 import re
@@ -36,17 +38,29 @@ def amalgamate(out: Path) -> None:
     """Write the library as a single header.
 
     Define BLW_IMPLEMENTATION in one source file before including it, and compile that file with
-    -ffp-contract=off.
+    -ffp-contract=off.  The folder blw/ beside it only lets generated models include it under the
+    names they know.
     """
+    write_files(out.parent / "blw", {name.removeprefix("blw/"): forward(out.name)
+                                     for name in headers()})
     write_files(out.parent, {out.name: text()})
     click.echo(f"wrote {out}")
+
+
+def forward(name: str) -> str:
+    """A header in blw/ that stands for the one called `name`, a folder above."""
+    return f'{_SPDX}#include "../{name}"\n'
+
+
+def headers() -> list[str]:
+    """The names of the public headers, as they are included."""
+    return sorted(f"blw/{path.name}" for path in (LIB / "include" / "blw").glob("*.h"))
 
 
 def text() -> str:
     """The header."""
     taken: set[str] = set()
-    public = "".join(_headers(sorted(f"blw/{path.name}"
-                                     for path in (LIB / "include" / "blw").glob("*.h")), taken))
+    public = "".join(_headers(headers(), taken))
     private = "".join(_source(name, taken) for name in sources())
     return "\n".join([
         _SPDX.rstrip(),
