@@ -71,19 +71,18 @@ static bool next_step(int32_t log, blw_mask_t *valid)
 static bool replay(int32_t log, int32_t results)
 {
     blw_estimator_out_t out;
-    blw_mask_t          valid   = 0U;
-    bool                written = true;
+    blw_mask_t          valid = 0U;
+    bool                written;
+    int32_t             status;
     uint32_t            start;
     uint32_t            ticks;
 
     counter_start();
-    start = counter_read();
-    (void)replay_pause(u, y, valid, &out);
+    start   = counter_read();
+    status  = (int32_t)replay_pause(u, y, valid, &out); /* kept, since that of a step is, too */
     ticks   = counter_read() - start;
-    written = host_io_write(results, &ticks, sizeof ticks);
+    written = (status == (int32_t)BLW_OK) && host_io_write(results, &ticks, sizeof ticks);
     while (written && next_step(log, &valid)) {
-        int32_t status;
-
         start  = counter_read();
         status = (int32_t)replay_step(u, y, valid, &out);
         ticks  = counter_read() - start;

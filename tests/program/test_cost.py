@@ -12,7 +12,7 @@ from blw.cost.programs import Program, build
 from blw.cost.targets import TARGETS
 
 KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
-        "instructions_worst", "flash_bytes", "ram_bytes", "stack_bytes"}
+        "instructions_worst", "cycles_typical", "flash_bytes", "ram_bytes", "stack_bytes"}
 
 pytestmark = pytest.mark.skipif(
     not (shutil.which("arm-none-eabi-gcc") and shutil.which("qemu-system-arm")),
@@ -31,6 +31,7 @@ def test_bench_given_one_estimator_yields_one_complete_row(kalman_bench):
     assert row.keys() == KEYS
     assert (row["target"], row["model"], row["method"]) == ("m4f", "liu5", "kalman")
     assert 100 < row["instructions_typical"] <= row["instructions_worst"]
+    assert row["instructions_typical"] < row["cycles_typical"] < 2 * row["instructions_typical"]
     assert row["instructions_typical"] <= row["instructions_mean_attacked"]
     assert row["ram_bytes"] > 4 * (3 + 3 + 5)  # x_hat, x_bar, suspicion, and pointers to them
     assert 0 < row["stack_bytes"] <= 512
@@ -46,7 +47,8 @@ def test_size_given_a_model_agrees_with_bench(bulwark, kalman_bench):
     (row,) = json.loads(done.stdout)["rows"]
     (measured,) = json.loads(kalman_bench)["rows"]
     assert row == {key: measured[key] for key in row}
-    assert measured.keys() - row.keys() == {key for key in KEYS if key.startswith("instructions")}
+    assert measured.keys() - row.keys() == {
+        key for key in KEYS if key.startswith(("instructions", "cycles"))}
 
 
 def test_size_given_a_method_that_refuses_lists_the_reason(bulwark):

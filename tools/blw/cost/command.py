@@ -9,7 +9,7 @@ import click
 from tqdm import tqdm
 
 from blw.atomic import write_files
-from blw.cost import cases, document, measure, targets
+from blw.cost import cases, contraction, document, measure, targets
 from blw.design import json_text
 from blw.errors import BulwarkError
 from blw.methods import REGISTRY
@@ -17,7 +17,7 @@ from blw.options import suggestion
 
 SIZES = {"flash_bytes": "flash", "ram_bytes": "RAM", "stack_bytes": "stack"}
 WORK = {"instructions_typical": "typical", "instructions_mean_attacked": "attacked",
-        "instructions_worst": "worst"}
+        "instructions_worst": "worst", "cycles_typical": "cycles"}
 
 Names = tuple[str, ...]
 
@@ -45,13 +45,15 @@ def bench(as_json: bool, path: Path | None, **names: Names) -> None:
     """Measure executed instructions per step, flash, RAM and worst-case stack of every method.
 
     Typical is the median of 50 steps without attack, attacked the mean of 200 attacked steps, worst
-    the most of all steps.  The programs run in QEMU, which counts exactly.
+    the most of all steps.  The programs run in QEMU, which counts exactly.  Cycles are those of a
+    typical step by a model of the Cortex-M4F, see docs/cost.md.
     """
     plan = _plan(**names)
     rows = list(tqdm(measure.measure(plan), "measuring", len(plan.programs), leave=False,
                      disable=None))
     if path:
-        write_files(path.parent, {path.name: document.text(rows, plan.refused)})
+        contracted = contraction.measure(plan, rows)
+        write_files(path.parent, {path.name: document.text(rows, contracted, plan.refused)})
     _print(rows, plan, WORK | SIZES, as_json)
 
 
@@ -85,4 +87,4 @@ def _table(rows: Iterable[dict[str, Any]], columns: dict[str, str]) -> Iterable[
            + "".join(f"{title:>11}" for title in columns.values()))
     for row in rows:
         yield (f"{row['target']:<11}{row['model']:<10}{row['method']:<10}"
-               + "".join(f"{row[key]:>11,.0f}" for key in columns))
+               + "".join(f"{document.figure(row[key]):>11}" for key in columns))

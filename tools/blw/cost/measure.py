@@ -12,10 +12,11 @@ import numpy as np
 from blw.build import StepFailed
 from blw.cost import programs
 from blw.cost.cases import BENIGN_STEPS, SETTLING_STEPS, Case, Prepared, owner, prepare
+from blw.cost.cycles import typical_cycles
 from blw.cost.programs import Program
 from blw.cost.sizes import flash_bytes, ram_bytes
 from blw.cost.stack import stack_bytes
-from blw.cost.targets import Target
+from blw.cost.targets import ICOUNT, Target
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +64,15 @@ def _sizes(program: Program, prepared: Prepared) -> dict[str, Any]:
 
 
 def _row(program: Program, prepared: Prepared) -> dict[str, Any]:
-    replay = programs.run(program, prepared, counting=True)
+    replay = programs.run(program, prepared, ICOUNT)
     if np.any(replay.steps["status"] != 0) or len(replay.steps) != len(prepared.log.y):
         raise StepFailed(f"{program.target.name}: {program.name}: a step was refused")
     counts = replay.instructions(program.target)
     attacked = counts[SETTLING_STEPS + BENIGN_STEPS:]
     benign = counts[SETTLING_STEPS:SETTLING_STEPS + BENIGN_STEPS]
+    typical = int(np.median(benign))
     return {**_sizes(program, prepared),
-            "instructions_typical": int(np.median(benign)),
+            "instructions_typical": typical,
             "instructions_mean_attacked": round(float(attacked.mean()), 1),
-            "instructions_worst": int(counts.max())}
+            "instructions_worst": int(counts.max()),
+            "cycles_typical": typical_cycles(program, prepared, typical)}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from blw.build import BUILD, ROOT, StepFailed, build_programs
 from blw.cost.cases import Prepared
-from blw.cost.targets import ICOUNT, NS_PER_INSTRUCTION, Target
+from blw.cost.targets import NS_PER_INSTRUCTION, Target
 
 QEMU = ROOT / "port" / "qemu.sh"
 
@@ -81,10 +81,10 @@ class Replay:
         return executed.astype(np.int64) + EMPTY_STEP
 
 
-def run(program: Program, prepared: Prepared, counting: bool = False) -> Replay:
-    """Replay the log of the case, slower if it is to count instructions.  Raises StepFailed."""
+def run(program: Program, prepared: Prepared, options: str = "") -> Replay:
+    """Replay the log of the case, with further options of QEMU.  Raises StepFailed."""
     target = program.target
-    environment = os.environ | {"BLW_QEMU_OPTIONS": ICOUNT if counting else ""}
+    environment = os.environ | {"BLW_QEMU_OPTIONS": options}
     emulator = [QEMU, target.qemu, target.machine] if target else []
     with tempfile.TemporaryDirectory(prefix="bulwark.") as name:
         log, out = Path(name, "log"), Path(name, "out")
