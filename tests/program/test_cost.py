@@ -6,11 +6,13 @@ import shutil
 
 import pytest
 
+from blw.analysis import instructions
 from blw.analysis.footprint import footprint
 from blw.cost import cases, document, sizes
 from blw.cost.programs import Program, build
 from blw.cost.targets import TARGETS
 
+SETTLED = cases.SETTLING_STEPS + cases.BENIGN_STEPS
 KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
         "instructions_worst", "cycles_typical", "flash_bytes", "ram_bytes", "stack_bytes"}
 
@@ -80,6 +82,31 @@ def test_footprint_given_every_method_is_what_the_linker_kept(name):
         computed = footprint(program.method, designed, prepared.design.plant)
         assert sizes.table_bytes(program) == computed.flash_bytes, program.method
         assert sizes.ram_bytes(program) == computed.ram_bytes, program.method
+
+
+def documented(root):
+    """(model, method) and typical instructions of every row of the Cortex-M4F in docs/cost.md."""
+    table = (root / "docs" / "cost.md").read_text().split("## Cortex-M4F")[1].split("##")[0]
+    rows = [[cell.strip(" `") for cell in line.split("|")[1:]] for line in table.splitlines()
+            if line.startswith("| ") and "---" not in line][1:]
+    return [(row[0], row[1], int(row[2].replace(",", ""))) for row in rows]
+
+
+def test_footprint_given_the_documented_steps_is_within_a_tenth_of_their_instructions(root):
+    """Every row of a method that the design tool gives instructions for, but of a bank that was
+    measured in its warm-up, where it does less."""
+    checked = set()
+    for model, method, measured in documented(root):
+        if method not in instructions.FORMULAS:
+            continue
+        design = cases.designed(cases.CASES[model], method)
+        designed = design.methods[method]
+        if designed.tables.members.get("warm_up", 0) > SETTLED and method == "bank":
+            continue
+        computed = footprint(method, designed, design.plant).instructions_typical
+        assert computed == pytest.approx(measured, rel=0.1), (model, method)
+        checked.add(method)
+    assert checked == set(instructions.FORMULAS)
 
 
 @pytest.mark.parametrize("option, value, hint", [

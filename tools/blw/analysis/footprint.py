@@ -2,7 +2,8 @@
 """Flash, RAM and work per step of a designed method on a 32-bit target with float numbers.
 
 Flash is that of the constant tables, the plant's included; the code of the library comes on top,
-once for all models.  RAM is the state structure and its memory.  Stack is measured, not computed.
+once for all models, and the straight-line code of a small plant, four bytes an operation.  RAM is
+the state structure and its memory.  Stack is measured, not computed.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from blw.analysis import instructions
 from blw.analysis.headers import macro, size_of
 from blw.design import Designed
 from blw.tables import Index, Struct, Table
@@ -25,24 +27,28 @@ MODULE = {"canonical": "lasso"}
 
 @dataclass(frozen=True)
 class Footprint:
-    """Bytes, and multiply-adds per step without alarm and at most (None: not modelled)."""
+    """Bytes; multiply-adds per step without alarm and at most, and instructions on a Cortex-M4F
+    without alarm (None: not modelled)."""
 
     flash_bytes: int
     ram_bytes: int
     macs_typical: int | None
     macs_worst: int | None
+    instructions_typical: int | None
 
 
 def footprint(name: str, designed: Designed, plant: Struct) -> Footprint:
     """Footprint of one designed method."""
     module = MODULE.get(name, name)
     numbers = macro(f"BLW_{module.upper()}_MEM")(*designed.mem)
-    typical, worst = COSTS[name](designed, plant.to_json()) if name in COSTS else (None, None)
+    tables = plant.to_json()
+    typical, worst = COSTS[name](designed, tables) if name in COSTS else (None, None)
     return Footprint(
         flash_bytes=table_bytes(designed.tables) + table_bytes(plant),
         ram_bytes=size_of(f"blw_{module}_t") + REAL * numbers,
         macs_typical=typical,
         macs_worst=worst,
+        instructions_typical=instructions.typical(name, designed, tables),
     )
 
 

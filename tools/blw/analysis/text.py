@@ -75,14 +75,16 @@ def _ratios(sensors: list[str], entry: dict[str, Any]) -> list[str]:
 
 
 def _costs(result: dict[str, Any]) -> list[str]:
-    lines = [f"{'Footprint':<11} {'flash B':>9} {'RAM B':>8}   multiply-adds: usual, at most"]
+    lines = [f"{'Footprint':<11} {'flash B':>9} {'RAM B':>8}   multiply-adds: usual, at most"
+             "   Cortex-M4F instructions: usual"]
     for name, entry in result["methods"].items():
         if "footprint" in entry:
             cost = entry["footprint"]
-            macs = [f"{value:>10,}" if value is not None else f"{'-':>10}"
-                    for value in (cost["macs_typical"], cost["macs_worst"])]
+            work = [f"{value:>{width},}" if value is not None else f"{'-':>{width}}"
+                    for value, width in ((cost["macs_typical"], 10), (cost["macs_worst"], 14),
+                                         (cost["instructions_typical"], 31))]
             lines.append(f"{name:<11} {cost['flash_bytes']:>9,} {cost['ram_bytes']:>8,}   "
-                         + "".join(macs))
+                         + "".join(work))
         elif "refused" in entry:
             lines.append(f"{name:<11} refused, see above" if "secure" in entry
                          else f"{name:<11} refused: {entry['refused']}")

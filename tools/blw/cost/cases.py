@@ -91,14 +91,18 @@ def prepare(case: Case, steps: int | None = None) -> Prepared:
 
     steps: length of the log if it is not that of the scenario.
     """
-    model = load(HOST_SIM / "models" / f"{case.name}.toml")
-    model = replace(model, methods={**model.methods, **case.options})
-    design = design_all(model)
+    design = designed(case)
     folder = FOLDER / "cases" / case.name
     lines = [f"blw_add_replay({case.name} {method} {owner(design, method)})"
              for method in design.methods]
     write_changed(folder, {**files(design), "replays.cmake": "\n".join(lines) + "\n"})
     return Prepared(case, design, simulate(case, design, steps), folder)
+
+
+def designed(case: Case, *methods: str) -> Design:
+    """The case's design: every method that accepts the model, or these methods."""
+    model = load(HOST_SIM / "models" / f"{case.name}.toml")
+    return design_all(replace(model, methods={**model.methods, **case.options}), methods)
 
 
 def owner(design: Design, method: str) -> str:

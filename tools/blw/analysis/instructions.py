@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: MIT
+"""Instructions of a step without alarm on a Cortex-M4F: float, gcc -O3, no contraction.
+
+What a step does is counted in the tables: multiply-adds of the loops, operations of the
+straight-line code, sensors and sets that are looked at.  What each of these takes is measured, and
+the tests hold the formulas to 10 % of every row of docs/cost.md.
+"""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from blw.design import Designed
+from blw.tables import Code
+
+#: kalman: around the straight-line code, and a multiply-add of the loops.
+KALMAN_AROUND = 54
+KALMAN_LOOP = 10.6
+
+#: decentral: around all, a sensor or row of a product, a multiply-add.
+DECENTRAL_AROUND = 1510
+DECENTRAL_ROW = 61
+DECENTRAL_LOOP = 6.0
+
+#: bank: around all, a multiply-add, a look whether a set holds a sensor.
+BANK_AROUND = 4170
+BANK_LOOP = 7.3
+BANK_LOOK = 21.4
+
+#: guard: a sensor, an operation of the straight-line code (registers that run out included), and a
+#: multiply-add of the loops.
+GUARD_SENSOR = 48
+GUARD_OPERATION = 1.22
+GUARD_LOOP = 3.9
+
+_NUMBER = re.compile(r"BLW_R\((-?)([0-9.e+-]+)\)")
+_ELEMENT = re.compile(r"\w+\[\d+\]")
+_SUM = re.compile(r" [+-]=? ")
+
+
+def operations(code: Code) -> int:
+    """Products, sums, and loads and stores of different numbers in straight-line code."""
+    text = " ".join(code.body)
+    constants = {found[2] for found in _NUMBER.finditer(text)}
+    bare = _NUMBER.sub("K", text)
+    return (bare.count(" * ") + len(_SUM.findall(bare)) + len(constants)
+            + len(set(_ELEMENT.findall(bare))))
+
+
+def typical(name: str, designed: Designed, plant: dict[str, Any]) -> int | None:
+    """Of the method `name`; None if it is not modelled.  plant: its tables as JSON."""
+    formula = FORMULAS.get(name)
+    return None if formula is None else formula(designed, plant)
+
+
+def _kalman(designed: Designed, plant: dict[str, Any]) -> int:
+    step = designed.tables.members["step"]
+    if isinstance(step, Code):
+        return KALMAN_AROUND + operations(step)
+    n = plant["n"]
+    return KALMAN_AROUND + round(KALMAN_LOOP * n * (n + plant["l"] + 2 * plant["m"]))
+
+
+def _decentral(designed: Designed, plant: dict[str, Any]) -> int | None:
+    n, m, mu, _, recursive = designed.mem
+    if recursive:
+        return None
+    local = np.diff(designed.tables.to_json()["first"])
+    d = mu - n
+    macs = (n * (n + plant["l"]) + m * n + int(local @ local) + d * mu - d * d // 2 + 2 * n * mu)
+    return DECENTRAL_AROUND + round(DECENTRAL_ROW * (m + mu) + DECENTRAL_LOOP * macs)
+
+
+def _bank(designed: Designed, plant: dict[str, Any]) -> int:
+    """After the warm-up."""
+    n, m = plant["n"], plant["m"]
+    tables = designed.tables.to_json()
+    h, sets, subsets = tables["horizon"], tables["sets"], tables["subsets"]
+    pairs = sets * tables["per_set"]
+    members = sum(mask.bit_count() for mask in tables["set_mask"])
+    samples = h * sum(mask.bit_count() for mask in tables["subset_mask"])
+    filters = n * (n + plant["l"] + m) + sets * n * n + 2 * members * n
+    tests = samples * n + h * n * (n + m) + pairs * n
+    looks = m * (sets + subsets * h + pairs)
+    return BANK_AROUND + round(BANK_LOOP * (filters + tests) + BANK_LOOK * looks)
+
+
+def _guard(designed: Designed, plant: dict[str, Any]) -> int:
+    n, m, r, _ = designed.mem
+    tables, N = designed.tables.to_json(), m * r
+    n_u, n_s = tables["n_u"], n - tables["n_u"]
+    loops = {
+        "advance": n * (n + plant["l"]) + m * n + len(tables["Lam"]) + len(tables["b"]),
+        "multiply": N * (N - r),
+        "squares": N,
+        "average": 2 * N,
+        "fuse": 2 * n_u * N + (n * n + n_s * N if n_s else 0),
+    }
+    straight = {part: designed.tables.members[part] for part in loops}
+    done = {part: operations(code) for part, code in straight.items() if isinstance(code, Code)}
+    rest = sum(macs for part, macs in loops.items() if part not in done)
+    return round(GUARD_SENSOR * m + GUARD_OPERATION * sum(done.values()) + GUARD_LOOP * rest)
+
+
+FORMULAS: dict[str, Callable[[Designed, dict[str, Any]], int | None]] = {
+    "kalman": _kalman, "decentral": _decentral, "bank": _bank, "guard": _guard,
+}
