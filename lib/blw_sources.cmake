@@ -32,6 +32,7 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_active_set.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_admm.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_kkt.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_refine.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_support.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_tableau.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_la.c

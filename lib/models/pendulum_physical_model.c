@@ -492,6 +492,297 @@ static const blw_real_t canonical_l1_P[10] = {
     BLW_R(0.000965125816134965),
 };
 
+/* y = S x: 256 multiply-adds */
+static void canonical_l1_symv(const blw_real_t *S, const blw_real_t *x, blw_real_t *y)
+{
+    const blw_real_t x0 = x[0];
+    const blw_real_t x1 = x[1];
+    const blw_real_t x2 = x[2];
+    const blw_real_t x3 = x[3];
+    const blw_real_t x4 = x[4];
+    const blw_real_t x5 = x[5];
+    const blw_real_t x6 = x[6];
+    const blw_real_t x7 = x[7];
+    const blw_real_t x8 = x[8];
+    const blw_real_t x9 = x[9];
+    const blw_real_t x10 = x[10];
+    const blw_real_t x11 = x[11];
+    const blw_real_t x12 = x[12];
+    const blw_real_t x13 = x[13];
+    const blw_real_t x14 = x[14];
+    const blw_real_t x15 = x[15];
+    blw_real_t y0 = (S[0] * x0) + (S[1] * x1) + (S[3] * x2);
+    blw_real_t y1 = (S[1] * x0) + (S[2] * x1) + (S[4] * x2);
+    blw_real_t y2 = (S[3] * x0) + (S[4] * x1) + (S[5] * x2);
+    blw_real_t y3 = (S[6] * x0) + (S[7] * x1) + (S[8] * x2) + (S[9] * x3) + (S[13] * x4) + (S[18] *
+        x5);
+    blw_real_t y4 = (S[10] * x0) + (S[11] * x1) + (S[12] * x2) + (S[13] * x3) + (S[14] * x4) +
+        (S[19] * x5);
+    blw_real_t y5 = (S[15] * x0) + (S[16] * x1) + (S[17] * x2) + (S[18] * x3) + (S[19] * x4) +
+        (S[20] * x5);
+    y0 = y0 + (S[6] * x3) + (S[10] * x4) + (S[15] * x5);
+    y1 = y1 + (S[7] * x3) + (S[11] * x4) + (S[16] * x5);
+    y2 = y2 + (S[8] * x3) + (S[12] * x4) + (S[17] * x5);
+    blw_real_t y6 = (S[21] * x0) + (S[22] * x1) + (S[23] * x2) + (S[24] * x3) + (S[25] * x4) +
+        (S[26] * x5) + (S[27] * x6) + (S[34] * x7) + (S[42] * x8);
+    blw_real_t y7 = (S[28] * x0) + (S[29] * x1) + (S[30] * x2) + (S[31] * x3) + (S[32] * x4) +
+        (S[33] * x5) + (S[34] * x6) + (S[35] * x7) + (S[43] * x8);
+    blw_real_t y8 = (S[36] * x0) + (S[37] * x1) + (S[38] * x2) + (S[39] * x3) + (S[40] * x4) +
+        (S[41] * x5) + (S[42] * x6) + (S[43] * x7) + (S[44] * x8);
+    y0 = y0 + (S[21] * x6) + (S[28] * x7) + (S[36] * x8);
+    y1 = y1 + (S[22] * x6) + (S[29] * x7) + (S[37] * x8);
+    y2 = y2 + (S[23] * x6) + (S[30] * x7) + (S[38] * x8);
+    y3 = y3 + (S[24] * x6) + (S[31] * x7) + (S[39] * x8);
+    y4 = y4 + (S[25] * x6) + (S[32] * x7) + (S[40] * x8);
+    y5 = y5 + (S[26] * x6) + (S[33] * x7) + (S[41] * x8);
+    blw_real_t y9 = (S[45] * x0) + (S[46] * x1) + (S[47] * x2) + (S[48] * x3) + (S[49] * x4) +
+        (S[50] * x5) + (S[51] * x6) + (S[52] * x7) + (S[53] * x8) + (S[54] * x9) + (S[64] * x10) +
+        (S[75] * x11);
+    blw_real_t y10 = (S[55] * x0) + (S[56] * x1) + (S[57] * x2) + (S[58] * x3) + (S[59] * x4) +
+        (S[60] * x5) + (S[61] * x6) + (S[62] * x7) + (S[63] * x8) + (S[64] * x9) + (S[65] * x10) +
+        (S[76] * x11);
+    blw_real_t y11 = (S[66] * x0) + (S[67] * x1) + (S[68] * x2) + (S[69] * x3) + (S[70] * x4) +
+        (S[71] * x5) + (S[72] * x6) + (S[73] * x7) + (S[74] * x8) + (S[75] * x9) + (S[76] * x10) +
+        (S[77] * x11);
+    y0 = y0 + (S[45] * x9) + (S[55] * x10) + (S[66] * x11);
+    y1 = y1 + (S[46] * x9) + (S[56] * x10) + (S[67] * x11);
+    y2 = y2 + (S[47] * x9) + (S[57] * x10) + (S[68] * x11);
+    y3 = y3 + (S[48] * x9) + (S[58] * x10) + (S[69] * x11);
+    y4 = y4 + (S[49] * x9) + (S[59] * x10) + (S[70] * x11);
+    y5 = y5 + (S[50] * x9) + (S[60] * x10) + (S[71] * x11);
+    y6 = y6 + (S[51] * x9) + (S[61] * x10) + (S[72] * x11);
+    y7 = y7 + (S[52] * x9) + (S[62] * x10) + (S[73] * x11);
+    y8 = y8 + (S[53] * x9) + (S[63] * x10) + (S[74] * x11);
+    blw_real_t y12 = (S[78] * x0) + (S[79] * x1) + (S[80] * x2) + (S[81] * x3) + (S[82] * x4) +
+        (S[83] * x5) + (S[84] * x6) + (S[85] * x7) + (S[86] * x8) + (S[87] * x9) + (S[88] * x10) +
+        (S[89] * x11) + (S[90] * x12) + (S[103] * x13) + (S[117] * x14);
+    blw_real_t y13 = (S[91] * x0) + (S[92] * x1) + (S[93] * x2) + (S[94] * x3) + (S[95] * x4) +
+        (S[96] * x5) + (S[97] * x6) + (S[98] * x7) + (S[99] * x8) + (S[100] * x9) + (S[101] * x10) +
+        (S[102] * x11) + (S[103] * x12) + (S[104] * x13) + (S[118] * x14);
+    blw_real_t y14 = (S[105] * x0) + (S[106] * x1) + (S[107] * x2) + (S[108] * x3) + (S[109] * x4) +
+        (S[110] * x5) + (S[111] * x6) + (S[112] * x7) + (S[113] * x8) + (S[114] * x9) + (S[115] *
+        x10) + (S[116] * x11) + (S[117] * x12) + (S[118] * x13) + (S[119] * x14);
+    y0 = y0 + (S[78] * x12) + (S[91] * x13) + (S[105] * x14);
+    y1 = y1 + (S[79] * x12) + (S[92] * x13) + (S[106] * x14);
+    y2 = y2 + (S[80] * x12) + (S[93] * x13) + (S[107] * x14);
+    y3 = y3 + (S[81] * x12) + (S[94] * x13) + (S[108] * x14);
+    y4 = y4 + (S[82] * x12) + (S[95] * x13) + (S[109] * x14);
+    y5 = y5 + (S[83] * x12) + (S[96] * x13) + (S[110] * x14);
+    y6 = y6 + (S[84] * x12) + (S[97] * x13) + (S[111] * x14);
+    y7 = y7 + (S[85] * x12) + (S[98] * x13) + (S[112] * x14);
+    y8 = y8 + (S[86] * x12) + (S[99] * x13) + (S[113] * x14);
+    y9 = y9 + (S[87] * x12) + (S[100] * x13) + (S[114] * x14);
+    y10 = y10 + (S[88] * x12) + (S[101] * x13) + (S[115] * x14);
+    y11 = y11 + (S[89] * x12) + (S[102] * x13) + (S[116] * x14);
+    blw_real_t y15 = (S[120] * x0) + (S[121] * x1) + (S[122] * x2) + (S[123] * x3) + (S[124] * x4) +
+        (S[125] * x5) + (S[126] * x6) + (S[127] * x7) + (S[128] * x8) + (S[129] * x9) + (S[130] *
+        x10) + (S[131] * x11) + (S[132] * x12) + (S[133] * x13) + (S[134] * x14) + (S[135] * x15);
+    y0 = y0 + (S[120] * x15);
+    y1 = y1 + (S[121] * x15);
+    y2 = y2 + (S[122] * x15);
+    y3 = y3 + (S[123] * x15);
+    y4 = y4 + (S[124] * x15);
+    y5 = y5 + (S[125] * x15);
+    y6 = y6 + (S[126] * x15);
+    y7 = y7 + (S[127] * x15);
+    y8 = y8 + (S[128] * x15);
+    y9 = y9 + (S[129] * x15);
+    y10 = y10 + (S[130] * x15);
+    y11 = y11 + (S[131] * x15);
+    y12 = y12 + (S[132] * x15);
+    y13 = y13 + (S[133] * x15);
+    y14 = y14 + (S[134] * x15);
+    y[0] = y0;
+    y[1] = y1;
+    y[2] = y2;
+    y[3] = y3;
+    y[4] = y4;
+    y[5] = y5;
+    y[6] = y6;
+    y[7] = y7;
+    y[8] = y8;
+    y[9] = y9;
+    y[10] = y10;
+    y[11] = y11;
+    y[12] = y12;
+    y[13] = y13;
+    y[14] = y14;
+    y[15] = y15;
+}
+
+/* T -= share col col': 136 multiply-adds */
+static void canonical_l1_reduce(const blw_real_t *col, blw_real_t share, blw_real_t *T)
+{
+    const blw_real_t x0 = col[0];
+    const blw_real_t x1 = col[1];
+    const blw_real_t x2 = col[2];
+    const blw_real_t x3 = col[3];
+    const blw_real_t x4 = col[4];
+    const blw_real_t x5 = col[5];
+    const blw_real_t x6 = col[6];
+    const blw_real_t x7 = col[7];
+    const blw_real_t x8 = col[8];
+    const blw_real_t x9 = col[9];
+    const blw_real_t x10 = col[10];
+    const blw_real_t x11 = col[11];
+    const blw_real_t x12 = col[12];
+    const blw_real_t x13 = col[13];
+    const blw_real_t x14 = col[14];
+    const blw_real_t x15 = col[15];
+    const blw_real_t a0 = x0 * share;
+    T[0] -= a0 * x0;
+    const blw_real_t a1 = x1 * share;
+    T[1] -= a1 * x0;
+    T[2] -= a1 * x1;
+    const blw_real_t a2 = x2 * share;
+    T[3] -= a2 * x0;
+    T[4] -= a2 * x1;
+    T[5] -= a2 * x2;
+    const blw_real_t a3 = x3 * share;
+    T[6] -= a3 * x0;
+    T[7] -= a3 * x1;
+    T[8] -= a3 * x2;
+    T[9] -= a3 * x3;
+    const blw_real_t a4 = x4 * share;
+    T[10] -= a4 * x0;
+    T[11] -= a4 * x1;
+    T[12] -= a4 * x2;
+    T[13] -= a4 * x3;
+    T[14] -= a4 * x4;
+    const blw_real_t a5 = x5 * share;
+    T[15] -= a5 * x0;
+    T[16] -= a5 * x1;
+    T[17] -= a5 * x2;
+    T[18] -= a5 * x3;
+    T[19] -= a5 * x4;
+    T[20] -= a5 * x5;
+    const blw_real_t a6 = x6 * share;
+    T[21] -= a6 * x0;
+    T[22] -= a6 * x1;
+    T[23] -= a6 * x2;
+    T[24] -= a6 * x3;
+    T[25] -= a6 * x4;
+    T[26] -= a6 * x5;
+    T[27] -= a6 * x6;
+    const blw_real_t a7 = x7 * share;
+    T[28] -= a7 * x0;
+    T[29] -= a7 * x1;
+    T[30] -= a7 * x2;
+    T[31] -= a7 * x3;
+    T[32] -= a7 * x4;
+    T[33] -= a7 * x5;
+    T[34] -= a7 * x6;
+    T[35] -= a7 * x7;
+    const blw_real_t a8 = x8 * share;
+    T[36] -= a8 * x0;
+    T[37] -= a8 * x1;
+    T[38] -= a8 * x2;
+    T[39] -= a8 * x3;
+    T[40] -= a8 * x4;
+    T[41] -= a8 * x5;
+    T[42] -= a8 * x6;
+    T[43] -= a8 * x7;
+    T[44] -= a8 * x8;
+    const blw_real_t a9 = x9 * share;
+    T[45] -= a9 * x0;
+    T[46] -= a9 * x1;
+    T[47] -= a9 * x2;
+    T[48] -= a9 * x3;
+    T[49] -= a9 * x4;
+    T[50] -= a9 * x5;
+    T[51] -= a9 * x6;
+    T[52] -= a9 * x7;
+    T[53] -= a9 * x8;
+    T[54] -= a9 * x9;
+    const blw_real_t a10 = x10 * share;
+    T[55] -= a10 * x0;
+    T[56] -= a10 * x1;
+    T[57] -= a10 * x2;
+    T[58] -= a10 * x3;
+    T[59] -= a10 * x4;
+    T[60] -= a10 * x5;
+    T[61] -= a10 * x6;
+    T[62] -= a10 * x7;
+    T[63] -= a10 * x8;
+    T[64] -= a10 * x9;
+    T[65] -= a10 * x10;
+    const blw_real_t a11 = x11 * share;
+    T[66] -= a11 * x0;
+    T[67] -= a11 * x1;
+    T[68] -= a11 * x2;
+    T[69] -= a11 * x3;
+    T[70] -= a11 * x4;
+    T[71] -= a11 * x5;
+    T[72] -= a11 * x6;
+    T[73] -= a11 * x7;
+    T[74] -= a11 * x8;
+    T[75] -= a11 * x9;
+    T[76] -= a11 * x10;
+    T[77] -= a11 * x11;
+    const blw_real_t a12 = x12 * share;
+    T[78] -= a12 * x0;
+    T[79] -= a12 * x1;
+    T[80] -= a12 * x2;
+    T[81] -= a12 * x3;
+    T[82] -= a12 * x4;
+    T[83] -= a12 * x5;
+    T[84] -= a12 * x6;
+    T[85] -= a12 * x7;
+    T[86] -= a12 * x8;
+    T[87] -= a12 * x9;
+    T[88] -= a12 * x10;
+    T[89] -= a12 * x11;
+    T[90] -= a12 * x12;
+    const blw_real_t a13 = x13 * share;
+    T[91] -= a13 * x0;
+    T[92] -= a13 * x1;
+    T[93] -= a13 * x2;
+    T[94] -= a13 * x3;
+    T[95] -= a13 * x4;
+    T[96] -= a13 * x5;
+    T[97] -= a13 * x6;
+    T[98] -= a13 * x7;
+    T[99] -= a13 * x8;
+    T[100] -= a13 * x9;
+    T[101] -= a13 * x10;
+    T[102] -= a13 * x11;
+    T[103] -= a13 * x12;
+    T[104] -= a13 * x13;
+    const blw_real_t a14 = x14 * share;
+    T[105] -= a14 * x0;
+    T[106] -= a14 * x1;
+    T[107] -= a14 * x2;
+    T[108] -= a14 * x3;
+    T[109] -= a14 * x4;
+    T[110] -= a14 * x5;
+    T[111] -= a14 * x6;
+    T[112] -= a14 * x7;
+    T[113] -= a14 * x8;
+    T[114] -= a14 * x9;
+    T[115] -= a14 * x10;
+    T[116] -= a14 * x11;
+    T[117] -= a14 * x12;
+    T[118] -= a14 * x13;
+    T[119] -= a14 * x14;
+    const blw_real_t a15 = x15 * share;
+    T[120] -= a15 * x0;
+    T[121] -= a15 * x1;
+    T[122] -= a15 * x2;
+    T[123] -= a15 * x3;
+    T[124] -= a15 * x4;
+    T[125] -= a15 * x5;
+    T[126] -= a15 * x6;
+    T[127] -= a15 * x7;
+    T[128] -= a15 * x8;
+    T[129] -= a15 * x9;
+    T[130] -= a15 * x10;
+    T[131] -= a15 * x11;
+    T[132] -= a15 * x12;
+    T[133] -= a15 * x13;
+    T[134] -= a15 * x14;
+    T[135] -= a15 * x15;
+}
+
 static const blw_l1_model_t canonical_l1 = {
     .N              = 16U,
     .d              = 12U,
@@ -508,6 +799,8 @@ static const blw_l1_model_t canonical_l1 = {
     .W              = canonical_l1_W,
     .G              = canonical_l1_G,
     .P              = canonical_l1_P,
+    .symv           = canonical_l1_symv,
+    .reduce         = canonical_l1_reduce,
     .rho            = BLW_R(0.0),
     .kappa_G        = BLW_R(0.14702559748531452),
     .kappa_W        = BLW_R(22.68104674346274),

@@ -157,7 +157,11 @@ BLW_COLD void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_
     self->z     = &self->step[N];
     self->dz    = &self->z[d];
     self->A     = &self->dz[d];
-    self->L     = (model->Z == NULL) ? &self->step[N + model->n] : &self->A[model->n_groups];
+    self->L     = &self->A[model->n_groups];
+    if (model->Z == NULL) {
+        self->L = &self->step[N + model->n];
+        self->z = &self->L[blw_la_packed_row(N)];
+    }
     blw_l1_reset(self);
 }
 

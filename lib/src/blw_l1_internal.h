@@ -99,6 +99,21 @@ static inline blw_real_t blw_l1_slack(blw_real_t c_i)
 /* Whether the sizes of l outside A and the signs of nu = zeta - tau on A are those of a minimum. */
 bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta);
 
+/* From l outside A and nu on A, both in self->l, as the sweeps left them, to l, tau and x [n].
+ * *bound = |last correction of x|.  @return whether they make a minimum. */
+bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound);
+
+/* y = S x for S [N x N], packed. */
+static inline void blw_l1_symv(const blw_l1_model_t *m, const blw_real_t *S, const blw_real_t *x,
+                               blw_real_t *y)
+{
+    if (m->symv != NULL) {
+        m->symv(S, x, y);
+    } else {
+        blw_la_symv(m->N, S, x, y);
+    }
+}
+
 /* h = -G' l, [n]: 0 at a minimum. */
 void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h);
 

@@ -17,13 +17,8 @@
  * on A, and a row of A has to leave first. */
 #define PIVOT_MIN (BLW_R(64.0) * BLW_REAL_EPS)
 
-/* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL, in
- * standard deviations of x, is the last. */
-#define REFINEMENTS 3U
-#define SMALL       BLW_R(1e-3)
-
-/* What rounding leaves of nu_i = zeta_i - tau_i, relative to what it is made of. */
-#define NU_SLACK (BLW_R(16.0) * BLW_REAL_EPS)
+/* Limit of |l_i| that sends every row of A to the test of its sign. */
+#define ALWAYS BLW_R(-1.0)
 
 static blw_real_t *row_of_T(const blw_l1_t *self, size_t i)
 {
@@ -44,15 +39,15 @@ static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
     }
 }
 
-/* Rows i to i + 2 of T minus their share of col col' / d, up to their diagonals. */
-static void reduce_rows(blw_l1_t *self, size_t i, blw_real_t inverse, const blw_real_t *col)
+/* Rows i to i + 2 of T minus their part of share col col', up to their diagonals. */
+static void reduce_rows(blw_l1_t *self, size_t i, blw_real_t share, const blw_real_t *col)
 {
     blw_real_t *const Ti = row_of_T(self, i);
     blw_real_t *const Tj = &Ti[i + 1U];
     blw_real_t *const Tk = &Tj[i + 2U];
-    const blw_real_t  a  = col[i] * inverse;
-    const blw_real_t  b  = col[i + 1U] * inverse;
-    const blw_real_t  c  = col[i + 2U] * inverse;
+    const blw_real_t  a  = col[i] * share;
+    const blw_real_t  b  = col[i + 1U] * share;
+    const blw_real_t  c  = col[i + 2U] * share;
 
     for (size_t j = 0U; j <= i; j++) {
         const blw_real_t x = col[j];
@@ -65,26 +60,37 @@ static void reduce_rows(blw_l1_t *self, size_t i, blw_real_t inverse, const blw_
     Tk[i + 2U] -= c * col[i + 2U];
 }
 
+/* T -= share col col'. */
+static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
+{
+    const size_t N = self->model->N;
+    size_t       i = 0U;
+
+    if (self->model->reduce != NULL) {
+        self->model->reduce(col, share, self->L);
+        return;
+    }
+    for (; (i + 3U) <= N; i += 3U) {
+        reduce_rows(self, i, share, col);
+    }
+    for (; i < N; i++) {
+        blw_la_axpy(i + 1U, -(col[i] * share), col, row_of_T(self, i));
+    }
+}
+
 /* Sweep (1) on row k, into A or out of it; col = column k. */
 static void sweep(blw_l1_t *self, size_t k, const blw_real_t *col)
 {
-    const size_t     N       = self->model->N;
-    const blw_real_t d       = col[k];
-    const blw_real_t inverse = BLW_R(1.0) / d;
-    const blw_real_t factor  = blw_la_abs(inverse);
-    size_t           i       = 0U;
+    const size_t     N      = self->model->N;
+    const blw_real_t share  = BLW_R(1.0) / col[k];
+    const blw_real_t factor = blw_la_abs(share);
+    blw_real_t      *Tk     = row_of_T(self, k);
 
-    for (; (i + 3U) <= N; i += 3U) {
-        reduce_rows(self, i, inverse, col);
-    }
-    for (; i < N; i++) {
-        blw_la_axpy(i + 1U, -(col[i] * inverse), col, row_of_T(self, i));
-    }
-    blw_real_t *Tk = row_of_T(self, k);
+    reduce(self, share, col);
     for (size_t j = 0U; j < k; j++) {
         Tk[j] = factor * col[j];
     }
-    Tk[k] = -inverse;
+    Tk[k] = -share;
     for (size_t j = k + 1U; j < N; j++) {
         Tk += j;
         Tk[k] = factor * col[j];
@@ -113,14 +119,71 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     return t;
 }
 
-/* Let row i enter with (2), in `most` sweeps.  @return the sweeps made, 0 if rounding leaves no way. */
-static unsigned enter(blw_l1_t *self, size_t i, unsigned most)
+/* A step of l and nu along column i of T, and what comes next. */
+typedef struct survey {
+    size_t best;   /* the row outside A whose entry gains most then, or N */
+    bool   turned; /* a nu would change its sign on the way */
+} survey_t;
+
+/* z = l - t T_i, T_i in self->step; with share = 1 / T_ii the gains are those after row i has entered,
+ * with 0 those of T as it is. */
+static survey_t advance(const blw_l1_t *self, blw_real_t t, blw_real_t share)
 {
-    const size_t     N      = self->model->N;
-    const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
-    blw_real_t       nu     = BLW_R(0.0);
-    unsigned         sweeps = 0U;
-    size_t           block;
+    const size_t            N     = self->model->N;
+    const blw_real_t *const col   = self->step;
+    const blw_real_t *const limit = self->tau;
+    const blw_real_t       *T_jj  = self->L;
+    survey_t                seen  = {N, false};
+    blw_real_t              most  = BLW_R(0.0); /* the largest gain, as a fraction */
+    blw_real_t              over  = BLW_R(1.0);
+
+    for (size_t j = 0U; j < N; j++) {
+        const blw_real_t v      = self->l[j] - (t * col[j]);
+        const blw_real_t excess = blw_la_abs(v) - limit[j];
+        self->z[j]              = v;
+        if (excess > BLW_R(0.0)) {
+            if (limit[j] < BLW_R(0.0)) {
+                seen.turned = seen.turned || ((v * self->dir[j]) < BLW_R(0.0));
+            } else {
+                const blw_real_t left = *T_jj - (col[j] * col[j] * share);
+                const blw_real_t gain = excess * excess;
+                if ((gain * over) > (most * blw_la_max(left, PIVOT_MIN))) {
+                    most      = gain;
+                    over      = blw_la_max(left, PIVOT_MIN);
+                    seen.best = j;
+                }
+            }
+        }
+        T_jj += j + 2U;
+    }
+    return seen;
+}
+
+/* Row i enters A with sign s, or leaves it with s = 0. */
+static void assign(blw_l1_t *self, size_t i, blw_real_t s)
+{
+    const blw_real_t c = self->model->c[i];
+
+    self->dir[i] = s;
+    self->tau[i] = blw_l1_clipped(self, i) ? ALWAYS : (c + blw_l1_slack(c));
+}
+
+/* z becomes l. */
+static void take_step(blw_l1_t *self)
+{
+    blw_real_t *const l = self->l;
+
+    self->l = self->z;
+    self->z = l;
+}
+
+/* Rows of A leave as their nu vanish, until row i can enter with sign s.  @return the sweeps made: none
+ * if rounding leaves no way, at most `most`. */
+static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
+{
+    blw_real_t nu     = BLW_R(0.0);
+    unsigned   sweeps = 0U;
+    size_t     block;
 
     do {
         column(self, i, self->step);
@@ -128,15 +191,15 @@ static unsigned enter(blw_l1_t *self, size_t i, unsigned most)
         if (t >= BLW_REAL_MAX) {
             return sweeps;
         }
-        blw_la_axpy(N, -(s * t), self->step, self->l);
+        blw_la_axpy(self->model->N, -(s * t), self->step, self->l);
         nu += s * t;
         if (block != i) {
-            self->l[block]   = self->model->c[block] * self->dir[block];
-            self->dir[block] = BLW_R(0.0);
+            self->l[block] = self->model->c[block] * self->dir[block];
+            assign(self, block, BLW_R(0.0));
             column(self, block, self->step);
         } else {
-            self->l[i]   = nu;
-            self->dir[i] = s;
+            self->l[i] = nu;
+            assign(self, i, s);
         }
         sweep(self, block, self->step);
         sweeps++;
@@ -144,27 +207,50 @@ static unsigned enter(blw_l1_t *self, size_t i, unsigned most)
     return sweeps;
 }
 
-/* The row outside A whose entry gains most, or N. */
-static size_t best_entry(const blw_l1_t *self)
+/* Row i enters at once.  @return what comes next; turned, and nothing changed, if it cannot. */
+static survey_t enter(blw_l1_t *self, size_t i, blw_real_t s)
 {
-    const size_t            N     = self->model->N;
-    const blw_real_t *const c     = self->model->c;
-    const blw_real_t       *T_ii  = self->L;
-    size_t                  found = N;
-    blw_real_t              best  = BLW_R(0.0);
+    survey_t seen = {i, true};
 
-    for (size_t i = 0U; i < N; i++) {
-        const blw_real_t excess = blw_la_abs(self->l[i]) - c[i];
-        if ((excess > blw_l1_slack(c[i])) && !blw_l1_clipped(self, i)) {
-            const blw_real_t gain = (excess * excess) / blw_la_max(*T_ii, PIVOT_MIN);
-            if (gain > best) {
-                best  = gain;
-                found = i;
-            }
+    column(self, i, self->step);
+    if (self->step[i] > PIVOT_MIN) {
+        const blw_real_t share = BLW_R(1.0) / self->step[i];
+        const blw_real_t t     = (self->l[i] - (s * self->model->c[i])) * share;
+        assign(self, i, s);
+        seen = advance(self, t, share);
+        if (seen.turned) {
+            assign(self, i, BLW_R(0.0));
+        } else {
+            take_step(self);
+            self->l[i] = t;
+            sweep(self, i, self->step);
         }
-        T_ii += i + 2U;
     }
-    return found;
+    return seen;
+}
+
+/* Sweeps until no row violates |l_i| <= c_i, as far as T can tell. */
+static void pivot(blw_l1_t *self, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m    = self->model;
+    survey_t                    seen = advance(self, BLW_R(0.0), BLW_R(0.0));
+
+    while ((seen.best < m->N) && (info->iterations < m->max_iterations)) {
+        const size_t     i      = seen.best;
+        const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
+        unsigned         sweeps = 1U;
+        seen                    = enter(self, i, s);
+        if (seen.turned) {
+            sweeps    = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations);
+            seen      = advance(self, BLW_R(0.0), BLW_R(0.0));
+            seen.best = (sweeps > 0U) ? seen.best : m->N;
+        }
+        info->iterations = (uint16_t)(info->iterations + sweeps);
+    }
+    if (self->l != &self->tau[m->N]) { /* where what follows does not write */
+        blw_la_copy(m->N, self->l, self->z);
+        take_step(self);
+    }
 }
 
 /* T for the present A, from S; a row that depends on those before it leaves A. */
@@ -179,105 +265,11 @@ static void rebuild(blw_l1_t *self)
             if (self->step[i] > PIVOT_MIN) {
                 sweep(self, i, self->step);
             } else {
-                self->l[i]   = self->model->c[i] * self->dir[i];
-                self->dir[i] = BLW_R(0.0);
+                self->l[i] = self->model->c[i] * self->dir[i];
+                assign(self, i, BLW_R(0.0));
             }
         }
     }
-}
-
-bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta)
-{
-    const blw_l1_model_t *const m = self->model;
-
-    for (size_t i = 0U; i < m->N; i++) {
-        if (blw_l1_clipped(self, i)) {
-            const blw_real_t own   = m->W[blw_la_packed_row(i) + i] * self->l[i];
-            const blw_real_t slack = blw_la_abs(zeta[i]) + blw_la_abs(own);
-            if (!(((zeta[i] - self->tau[i]) * self->dir[i]) >= -(NU_SLACK * slack))) {
-                return false;
-            }
-        } else if (!(blw_la_abs(self->l[i]) <= (m->c[i] + blw_l1_slack(m->c[i])))) {
-            return false;
-        }
-    }
-    return true;
-}
-
-/* From what the sweeps left: l_A = c_A s_A, tau = zeta - nu, x = F tau. */
-static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
-{
-    const blw_l1_model_t *const m = self->model;
-
-    for (size_t i = 0U; i < m->N; i++) {
-        self->tau[i] = zeta[i];
-        if (blw_l1_clipped(self, i)) {
-            self->tau[i] -= self->l[i];
-            self->l[i] = m->c[i] * self->dir[i];
-        }
-    }
-    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
-}
-
-/* One step of refinement with the inverse that T is a part of.  With e = zeta - tau outside A,
- * h = -G' l, w = F' h and P = F W F',
- *     [ dl_f  ]     [  e_f ]   [ w_f ]
- *     [ dnu_A ] = T [ -w_A ] + [ 0   ],     dx = F_f e_f - F_A dnu_A - P h.                     (3)
- * *bound = |dx|.  @return whether dx is a small part of the standard deviations of x. */
-static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
-{
-    const blw_l1_model_t *const m      = self->model;
-    blw_real_t *const           h      = &self->step[m->N];
-    blw_real_t *const           change = row_of_T(self, m->N); /* free: T is all of L but this */
-    blw_real_t                  sum    = BLW_R(0.0);
-    bool                        small  = true;
-
-    blw_l1_imbalance(self, h);
-    blw_la_fill(m->N, BLW_R(0.0), self->step);
-    for (size_t j = 0U; j < m->n; j++) {
-        blw_la_axpy(m->N, h[j], &m->F[j * m->N], self->step);
-    }
-    for (size_t i = 0U; i < m->N; i++) {
-        const bool clipped = blw_l1_clipped(self, i);
-        self->l[i] += clipped ? BLW_R(0.0) : self->step[i];
-        self->step[i] = clipped ? -self->step[i] : (zeta[i] - self->tau[i]);
-    }
-    blw_la_symv(m->N, self->L, self->step, change);
-    for (size_t i = 0U; i < m->N; i++) {
-        if (blw_l1_clipped(self, i)) {
-            self->tau[i] -= change[i];
-            self->step[i] = -change[i];
-        } else {
-            self->tau[i] = zeta[i];
-            self->l[i] += change[i];
-        }
-    }
-    blw_la_symv(m->n, m->P, h, change);
-    for (size_t j = 0U; j < m->n; j++) {
-        const blw_real_t dx   = blw_la_dot(m->N, &m->F[j * m->N], self->step) - change[j];
-        const blw_real_t P_jj = m->P[blw_la_packed_row(j) + j];
-        x[j] += dx;
-        sum += dx * dx;
-        small = small && ((dx * dx) <= (SMALL * SMALL * P_jj));
-    }
-    *bound = blw_la_sqrt(sum);
-    return small;
-}
-
-/* Refine l, nu and x with residuals formed in W, and verify the minimum; by factors of W where T is
- * too coarse for that. */
-static bool refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
-{
-    const blw_l1_model_t *const m       = self->model;
-    bool                        settled = false;
-
-    split(self, zeta, x);
-    for (size_t round = 0U; (round < REFINEMENTS) && !settled; round++) {
-        blw_la_symv(m->N, m->W, self->l, self->tau);
-        blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
-        settled = correct(self, zeta, x, bound);
-    }
-    return settled ? blw_l1_holds(self, zeta) : blw_l1_kkt(self, zeta, x, bound);
 }
 
 /* nu = 0 on the rows of A that the verification found turned round; on the others l becomes nu.
@@ -287,31 +279,14 @@ static bool drop_turned(blw_l1_t *self, const blw_real_t *zeta)
     bool dropped = false;
 
     for (size_t j = 0U; j < self->model->N; j++) {
-        if (blw_l1_clipped(self, j)) {
-            const blw_real_t nu = zeta[j] - self->tau[j];
-            if ((nu * self->dir[j]) > BLW_R(0.0)) {
-                self->l[j] = nu;
-            } else {
-                self->dir[j] = BLW_R(0.0);
-                self->tau[j] = zeta[j];
-                dropped      = true;
-            }
-        }
+        const bool       clipped = blw_l1_clipped(self, j);
+        const blw_real_t nu      = zeta[j] - self->tau[j];
+        const bool       keep    = clipped && ((nu * self->dir[j]) > BLW_R(0.0));
+        dropped                  = dropped || (clipped && !keep);
+        self->l[j]               = keep ? nu : self->l[j];
+        assign(self, j, keep ? self->dir[j] : BLW_R(0.0));
     }
     return dropped;
-}
-
-/* Sweeps until no row violates |l_i| <= c_i, as far as T can tell. */
-static void pivot(blw_l1_t *self, blw_l1_info_t *info)
-{
-    const blw_l1_model_t *const m = self->model;
-    size_t                      i = best_entry(self);
-
-    while ((i < m->N) && (info->iterations < m->max_iterations)) {
-        const unsigned sweeps = enter(self, i, (unsigned)m->max_iterations - info->iterations);
-        info->iterations      = (uint16_t)(info->iterations + sweeps);
-        i                     = (sweeps > 0U) ? best_entry(self) : m->N;
-    }
 }
 
 static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
@@ -319,14 +294,17 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
     const blw_l1_model_t *const m       = self->model;
     bool                        dropped = false;
 
-    blw_la_fill(m->N, BLW_R(0.0), self->dir);
+    for (size_t i = 0U; i < m->N; i++) {
+        assign(self, i, BLW_R(0.0));
+        self->step[i] = BLW_R(0.0);
+    }
     do {
         if (dropped) {
             info->converged = blw_l1_kkt(self, zeta, x, &info->bound);
         } else {
             rebuild(self);
             pivot(self, info);
-            info->converged = refine(self, zeta, x, &info->bound);
+            info->converged = blw_l1_refine(self, zeta, x, &info->bound);
         }
         if (!info->converged && (info->iterations < m->max_iterations)) {
             info->iterations++;
@@ -334,14 +312,14 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
         }
     } while (!info->converged && (info->iterations < m->max_iterations));
     if (!info->converged) {
-        blw_la_symv(m->N, m->S, self->tau, self->l);
+        blw_l1_symv(m, m->S, self->tau, self->l);
         blw_la_gemv(m->n, m->N, m->F, self->tau, x);
     }
 }
 
 static void multiply(blw_l1_t *self, const blw_real_t *zeta)
 {
-    blw_la_symv(self->model->N, self->model->S, zeta, self->l);
+    blw_l1_symv(self->model, self->model->S, zeta, self->l);
 }
 
 static bool fits(const blw_l1_model_t *m)

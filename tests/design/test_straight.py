@@ -72,8 +72,9 @@ int main(void)
 
 PARTS = {
     "kalman": "bare = blw_NAME_kalman; bare.step = NULL;",
-    "lasso": """static blw_jordan_model_t filters;
-    bare = blw_NAME_lasso; filters = *bare.jordan; filters.step = NULL; bare.jordan = &filters;""",
+    "lasso": """static blw_jordan_model_t filters; static blw_l1_model_t fusion;
+    bare = blw_NAME_lasso; filters = *bare.jordan; filters.step = NULL; bare.jordan = &filters;
+    fusion = *bare.l1; fusion.symv = NULL; fusion.reduce = NULL; bare.l1 = &fusion;""",
     "guard": """bare = blw_NAME_guard; bare.advance = NULL; bare.multiply = NULL; bare.move = NULL;
     bare.squares = NULL; bare.average = NULL; bare.fuse = NULL;""",
 }
@@ -94,8 +95,9 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     text = text.replace(f"BLW_{name.upper()}_{method}_", f"BLW_{name.upper()}_{method.upper()}_")
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
-               "l1_kkt", "l1_support", "l1_tableau", "guard", "guard_S", "guard_beside",
-               "guard_bound", "guard_check", "guard_filters", "guard_search", "guard_solve"]
+               "l1_kkt", "l1_refine", "l1_support", "l1_tableau", "guard", "guard_S",
+               "guard_beside", "guard_bound", "guard_check", "guard_filters", "guard_search",
+               "guard_solve"]
     sources = [ROOT / "lib" / "src" / f"blw_{module}.c" for module in modules]
     subprocess.run(["gcc", "-std=c99", "-O1", "-ffp-contract=off", *WIDTHS[width],
                     f"-I{ROOT / 'lib' / 'include'}", *sources, folder / f"{name}_model.c",

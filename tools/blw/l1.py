@@ -21,6 +21,7 @@ import scipy.linalg
 import scipy.special
 from numpy.typing import NDArray
 
+from blw import l1_straight
 from blw.errors import DesignError
 from blw.tables import Link, Struct, index, real, table
 
@@ -262,6 +263,8 @@ def struct(
             "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if tableau else None,
             "P": table(pack_lower(scaled_F @ reduced_form.W @ scaled_F.T), "[n(n+1)/2] F W F'")
             if tableau else None,
+            "symv": l1_straight.symv(N) if tableau else None,
+            "reduce": l1_straight.reduce(N) if tableau else None,
             "rho": real(engine.rho),
             "kappa_G": real(kappa_G),
             "kappa_W": real(kappa_W),

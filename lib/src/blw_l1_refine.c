@@ -1,0 +1,104 @@
+/* SPDX-License-Identifier: MIT */
+/* The end of a solve on the tableau (blw_l1_tableau.c): l, nu and x from the sweeps are corrected by
+ * residuals formed in W and G, and held against (4) of blw_l1.h. */
+#include "blw_l1_internal.h"
+
+/* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL, in
+ * standard deviations of x, is the last. */
+#define REFINEMENTS 3U
+#define SMALL       BLW_R(1e-2)
+
+/* What rounding leaves of nu_i = zeta_i - tau_i, relative to what it is made of. */
+#define NU_SLACK (BLW_R(16.0) * BLW_REAL_EPS)
+
+bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    for (size_t i = 0U; i < m->N; i++) {
+        if (blw_l1_clipped(self, i)) {
+            const blw_real_t own   = m->W[blw_la_packed_row(i) + i] * self->l[i];
+            const blw_real_t slack = blw_la_abs(zeta[i]) + blw_la_abs(own);
+            if (!(((zeta[i] - self->tau[i]) * self->dir[i]) >= -(NU_SLACK * slack))) {
+                return false;
+            }
+        } else if (!(blw_la_abs(self->l[i]) <= (m->c[i] + blw_l1_slack(m->c[i])))) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* From what the sweeps left: l_A = c_A s_A, tau = zeta - nu, x = F tau. */
+static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    for (size_t i = 0U; i < m->N; i++) {
+        self->tau[i] = zeta[i];
+        if (blw_l1_clipped(self, i)) {
+            self->tau[i] -= self->l[i];
+            self->l[i] = m->c[i] * self->dir[i];
+        }
+    }
+    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
+}
+
+/* One step of refinement with the inverse that T is a part of.  With e = zeta - tau outside A,
+ * h = -G' l, w = F' h and P = F W F',
+ *     [ dl_f  ]     [  e_f ]   [ w_f ]
+ *     [ dnu_A ] = T [ -w_A ] + [ 0   ],     dx = F_f e_f - F_A dnu_A - P h.                     (3)
+ * *bound = |dx|.  @return whether dx is a small part of the standard deviations of x. */
+static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+{
+    const blw_l1_model_t *const m      = self->model;
+    blw_real_t *const           h      = &self->step[m->N];
+    blw_real_t *const           change = self->z;
+    blw_real_t                  sum    = BLW_R(0.0);
+    bool                        small  = true;
+
+    blw_l1_imbalance(self, h);
+    blw_la_fill(m->N, BLW_R(0.0), self->step);
+    for (size_t j = 0U; j < m->n; j++) {
+        blw_la_axpy(m->N, h[j], &m->F[j * m->N], self->step);
+    }
+    for (size_t i = 0U; i < m->N; i++) {
+        const bool clipped = blw_l1_clipped(self, i);
+        self->l[i] += clipped ? BLW_R(0.0) : self->step[i];
+        self->step[i] = clipped ? -self->step[i] : (zeta[i] - self->tau[i]);
+    }
+    blw_l1_symv(m, self->L, self->step, change);
+    for (size_t i = 0U; i < m->N; i++) {
+        if (blw_l1_clipped(self, i)) {
+            self->tau[i] -= change[i];
+            self->step[i] = -change[i];
+        } else {
+            self->tau[i] = zeta[i];
+            self->l[i] += change[i];
+        }
+    }
+    blw_la_symv(m->n, m->P, h, change);
+    for (size_t j = 0U; j < m->n; j++) {
+        const blw_real_t dx   = blw_la_dot(m->N, &m->F[j * m->N], self->step) - change[j];
+        const blw_real_t P_jj = m->P[blw_la_packed_row(j) + j];
+        x[j] += dx;
+        sum += dx * dx;
+        small = small && ((dx * dx) <= (SMALL * SMALL * P_jj));
+    }
+    *bound = blw_la_sqrt(sum);
+    return small;
+}
+
+bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+{
+    const blw_l1_model_t *const m       = self->model;
+    bool                        settled = false;
+
+    split(self, zeta, x);
+    for (size_t round = 0U; (round < REFINEMENTS) && !settled; round++) {
+        blw_l1_symv(m, m->W, self->l, self->tau);
+        blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
+        settled = correct(self, zeta, x, bound);
+    }
+    return settled ? blw_l1_holds(self, zeta) : blw_l1_kkt(self, zeta, x, bound);
+}
