@@ -18,9 +18,8 @@ from blw.build import BUILD, ROOT, build_programs, simulator
 from blw.design import design_all, document, json_text
 from blw.model import load
 
-#: A step is six frames to the firmware and four back.
+#: A step is six frames to the firmware and four back: 1,000 frames, extended 20,000.
 STEPS = 2_000 if os.environ.get("BULWARK_EXTENDED") else 100
-UML_STEPS = 2_000 if os.environ.get("BULWARK_EXTENDED") else 50
 METHOD = "canonical"
 
 
@@ -49,7 +48,7 @@ def test_node_given_attacked_frames_answers_all_with_the_bits_of_the_host(design
     outcome = pil.check(design, METHOD, tmp_path)
     assert (outcome.lost, outcome.different) == (0, 0)
     assert (outcome.steps, outcome.sent, outcome.received) == (STEPS, 6 * STEPS, 4 * STEPS)
-    assert outcome.sent + outcome.received >= 1_000
+    assert outcome.sent + outcome.received == 10 * STEPS
     assert json.loads((tmp_path / "pil.json").read_text())["steps"] == STEPS
 
 
@@ -77,7 +76,7 @@ def test_check_given_other_outputs_than_the_firmware_s_finds_them(design, tmp_pa
 
 
 def test_node_given_socketcan_in_between_answers_all_with_the_bits_of_the_host(design, tmp_path):
-    simulate(design, UML_STEPS, tmp_path)
+    simulate(design, STEPS, tmp_path)
 
     def driver(line: Path, steps):
         sent, heard = tmp_path / "sent", tmp_path / "heard"
@@ -97,7 +96,7 @@ def test_node_given_socketcan_in_between_answers_all_with_the_bits_of_the_host(d
 
     outcome = pil.check(design, METHOD, tmp_path, driver)
     assert (outcome.lost, outcome.different) == (0, 0)
-    assert (outcome.steps, outcome.received) == (UML_STEPS, 4 * UML_STEPS)
+    assert (outcome.steps, outcome.sent, outcome.received) == (STEPS, 6 * STEPS, 4 * STEPS)
 
 
 def connect(uart, line):
