@@ -117,7 +117,13 @@ static void spread(blw_mask_t mask, size_t m, int8_t *flags)
     }
 }
 
-static bool publish_estimate(blw_port_lcm_t *self, char *method, int8_t *excluded)
+/* What the messages of a report have in common; LCM's structs are not const. */
+typedef struct verdict {
+    char   method[32];
+    int8_t excluded[BLW_MAX_SENSORS];
+} verdict_t;
+
+static bool publish_estimate(blw_port_lcm_t *self, verdict_t *verdict)
 {
     const blw_node_report_t *const   report = self->report;
     const blw_estimator_out_t *const out    = &report->out;
@@ -132,12 +138,12 @@ static bool publish_estimate(blw_port_lcm_t *self, char *method, int8_t *exclude
     }
     const bulwark_estimate_t message = {.utime      = utime(),
                                         .seq        = (int64_t)report->k,
-                                        .method     = method,
+                                        .method     = verdict->method,
                                         .n          = self->plant->n,
                                         .x_hat      = x_hat,
                                         .m          = self->plant->m,
                                         .suspicion  = suspicion,
-                                        .excluded   = excluded,
+                                        .excluded   = verdict->excluded,
                                         .outcome    = out->outcome,
                                         .flags      = out->flags,
                                         .iterations = out->iterations,
@@ -147,14 +153,14 @@ static bool publish_estimate(blw_port_lcm_t *self, char *method, int8_t *exclude
     return count(self, bulwark_estimate_t_publish(self->lcm, "BLW_ESTIMATE", &message));
 }
 
-static bool publish_alarm(blw_port_lcm_t *self, char *method, int8_t *excluded)
+static bool publish_alarm(blw_port_lcm_t *self, verdict_t *verdict)
 {
     const blw_node_report_t *const report  = self->report;
     const bulwark_alarm_t          message = {.utime     = utime(),
                                               .seq       = (int64_t)report->k,
-                                              .method    = method,
+                                              .method    = verdict->method,
                                               .m         = self->plant->m,
-                                              .excluded  = excluded,
+                                              .excluded  = verdict->excluded,
                                               .statistic = (double)report->out.statistic,
                                               .threshold = (double)report->out.threshold};
 
@@ -219,22 +225,21 @@ static void take_estimate(blw_port_lcm_t *self, const blw_frame_t *frame)
 static bool publish_report(blw_port_lcm_t *self)
 {
     const blw_node_report_t *const report = self->report;
-    char                           method[32];
-    int8_t                         excluded[BLW_MAX_SENSORS];
+    verdict_t                      verdict;
 
     const bool alarm = (report->out.excluded != self->excluded)
                        || ((report->out.threshold > BLW_R(0.0))
                            && (report->out.statistic > report->out.threshold));
-    (void)strncpy(method, self->method, sizeof method - 1U); /* LCM's structs are not const */
-    method[sizeof method - 1U] = '\0';
-    spread(report->out.excluded, self->plant->m, excluded);
+    (void)strncpy(verdict.method, self->method, sizeof verdict.method - 1U);
+    verdict.method[sizeof verdict.method - 1U] = '\0';
+    spread(report->out.excluded, self->plant->m, verdict.excluded);
     if (((report->events != 0U) || (report->rejected != 0U)) && !publish_health(self)) {
         return false;
     }
-    if (alarm && !publish_alarm(self, method, excluded)) {
+    if (alarm && !publish_alarm(self, &verdict)) {
         return false;
     }
-    return publish_estimate(self, method, excluded);
+    return publish_estimate(self, &verdict);
 }
 
 bool blw_lcm_publish(blw_port_lcm_t *self, const blw_frame_t *frame)

@@ -1,63 +1,84 @@
 /* SPDX-License-Identifier: MIT */
 #include "blw_port_replay.h"
 #include <errno.h>
-#include <inttypes.h>
 #include <string.h>
 
 #define LINE_MAX_BYTES   512U
 #define AFTER_THE_END_US 1000000U /* so that the last step meets its deadline */
 
-static bool read_byte(const char *hex, uint8_t *byte)
+static unsigned digit_of(char letter)
 {
-    unsigned value = 0U;
-    int      used  = 0;
+    static const char digits[] = "0123456789abcdef0123456789ABCDEF";
+    const char *const found    = (letter != '\0') ? strchr(digits, letter) : NULL;
 
-    if ((sscanf(hex, "%2x%n", &value, &used) != 1) || (used != 2)) {
-        return false;
-    }
-    *byte = (uint8_t)value;
-    return true;
+    return (found != NULL) ? ((unsigned)(found - digits) % 16U) : 16U;
 }
 
-/* "#2A36": classic; "##12A36": FD with its flags. */
+/* A number of least to most digits; *text goes behind it. */
+static bool take_number(const char **text, unsigned base, size_t least, size_t most,
+                        uint64_t *value)
+{
+    size_t count = 0U;
+
+    *value = 0U;
+    while ((count < most) && (digit_of(**text) < base)) {
+        *value = (*value * base) + digit_of(**text);
+        (*text)++;
+        count++;
+    }
+    return count >= least;
+}
+
+static bool take_letter(const char **text, char letter)
+{
+    const bool there = **text == letter;
+
+    *text += there ? 1 : 0;
+    return there;
+}
+
+/* "2A36": classic; "#12A36": FD with its flags. */
 static bool read_data(const char *text, blw_frame_t *frame)
 {
-    const bool   fd     = text[1] == '#';
-    const char  *hex    = (fd && (text[2] != '\0')) ? &text[3] : &text[1];
-    const size_t digits = strlen(hex);
-    const size_t bytes  = digits / 2U;
+    const size_t most  = (*text == '#') ? BLW_FRAME_MAX : BLW_FRAME_CLASSIC_MAX;
+    uint64_t     value = 0U;
+    size_t       count = 0U;
 
-    if (((digits % 2U) != 0U) || (bytes > (fd ? BLW_FRAME_MAX : BLW_FRAME_CLASSIC_MAX))) {
+    if (take_letter(&text, '#') && !take_number(&text, 16U, 1U, 1U, &value)) {
         return false;
     }
-    frame->len = (uint8_t)bytes;
-    for (size_t i = 0U; i < bytes; i++) {
-        if (!read_byte(&hex[2U * i], &frame->data[i])) {
+    while ((count < most) && (digit_of(*text) < 16U)) {
+        if (!take_number(&text, 16U, 2U, 2U, &value)) {
             return false;
         }
+        frame->data[count] = (uint8_t)value;
+        count++;
     }
-    return true;
+    frame->len = (uint8_t)count;
+    return strspn(text, " \r\n") == strlen(text);
 }
 
 /* "(1436509052.249713) vcan0 101#..." */
 static bool read_line(const char *line, blw_frame_t *frame)
 {
-    char     id[16];
-    char     data[160];
     uint64_t seconds      = 0U;
     uint64_t microseconds = 0U;
-    unsigned number       = 0U;
+    uint64_t id           = 0U;
 
-    if ((sscanf(line, "(%" SCNu64 ".%6" SCNu64 ") %*31s %15[0-9A-Fa-f]%159s", &seconds,
-                &microseconds, id, data)
-         != 4)
-        || (strlen(id) != 3U) || (data[0] != '#') || (sscanf(id, "%x", &number) != 1)
-        || (number > 0x7FFU)) {
+    if (!take_letter(&line, '(') || !take_number(&line, 10U, 1U, 12U, &seconds)
+        || !take_letter(&line, '.') || !take_number(&line, 10U, 6U, 6U, &microseconds)
+        || !take_letter(&line, ')')) {
+        return false;
+    }
+    line += strspn(line, " ");
+    line += strcspn(line, " "); /* the interface */
+    line += strspn(line, " ");
+    if (!take_number(&line, 16U, 3U, 3U, &id) || (id > 0x7FFU) || !take_letter(&line, '#')) {
         return false;
     }
     frame->t_us = (seconds * 1000000U) + microseconds;
-    frame->id   = (uint16_t)number;
-    return read_data(data, frame);
+    frame->id   = (uint16_t)id;
+    return read_data(line, frame);
 }
 
 static void advance(blw_port_replay_t *self)

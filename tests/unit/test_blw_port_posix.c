@@ -165,6 +165,13 @@ static void test_replay_given_a_log_yields_its_frames_in_its_time(void)
                                "(100.000004) vcan0 12345678#00\n"
                                "(100.000005) vcan0 123#R\n"
                                "not a frame\n"
+                               "(100.000005) vcan0 800#00\n"
+                               "(100.5) vcan0 101#00\n"
+                               "(99999999999999999999.000000) vcan0 101#00\n"
+                               "(100.000005) vcan0 101#001\n"
+                               "(100.000005) vcan0 101#000102030405060708\n"
+                               "(100.000005) vcan0 101##\n"
+                               "(100.000005) vcan0 101\n"
                                "(100.000002) vcan0 7FF#\n";
     char              path[] = "/tmp/blw_replay.XXXXXX";
     const int         fd     = mkstemp(path);
@@ -189,7 +196,7 @@ static void test_replay_given_a_log_yields_its_frames_in_its_time(void)
     TEST_ASSERT_EQUAL_UINT64(100000003U, frame.t_us); /* time does not go back */
     TEST_ASSERT_FALSE(blw_port_recv(&port.base, &frame));
     TEST_ASSERT_TRUE(port.ended);
-    TEST_ASSERT_EQUAL_UINT64(3U, port.skipped);
+    TEST_ASSERT_EQUAL_UINT64(10U, port.skipped);
     TEST_ASSERT_TRUE(blw_port_send(&port.base, &frame));
     blw_port_replay_close(&port);
     TEST_ASSERT_TRUE(blw_port_replay_open(&port, "/nonexistent/log") > 0);

@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Checks of the sources themselves: format, static analysis, shell scripts."""
 
+import json
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import click
 
-from blw.build import BUILD, ROOT, configure
+from blw.build import BUILD, ROOT, build_programs, configure
 from blw.tally import Tally
 
 LLVM = "14"  # Debian 12's; another version formats differently
@@ -21,8 +23,9 @@ SHELL = ("tools/bulwark", "tools/setup/setup.sh", "tools/check_archive.sh", ".ci
 def run() -> Tally:
     """Run every check; prints what they find."""
     database = configure("clang-f32")
+    build_programs("clang-f32", ["blw_port_posix"])  # it makes the headers of LCM's messages
     library = _sources("lib/src", ".c")
-    port = _sources("port/src", ".c")
+    port = _sources("port/src", ".c") + _compiled("port/posix", database)
     written = (_sources("lib/include", ".h") + _sources("lib/src", ".c", ".h")
                + _sources("port", ".c", ".h") + _sources("host_sim", ".cpp", ".h")
                + _sources("tests", ".c", ".h", ".cpp", ".hpp"))
@@ -32,12 +35,19 @@ def run() -> Tally:
                        for source in library + port],
         "cppcheck": [["cppcheck", "--quiet", "--std=c99", "--inline-suppr", "--error-exitcode=1",
                       "--enable=warning,performance,portability", "-Ilib/include", "-Ilib/src",
-                      "-Iport/include", *library, *port]],
+                      "-Iport/include", "-Iport/posix", *library, *port]],
         "shellcheck": [["shellcheck", "--external-sources", *SHELL]],
         "ruff": [[sys.executable, "-m", "ruff", "check", "--quiet", "tools", "tests"]],
     }
     checked = sum((_check(name, each) for name, each in commands.items()), Tally())
     return checked + _misra(library)
+
+
+def _compiled(folder: str, database: Path) -> list[str]:
+    """The sources that are part of a build: without LCM, its back end is not."""
+    entries = json.loads((database / "compile_commands.json").read_text("utf-8"))
+    built = {Path(entry["file"]) for entry in entries}
+    return [source for source in _sources(folder, ".c") if ROOT / source in built]
 
 
 def _sources(folder: str, *suffixes: str) -> list[str]:
