@@ -339,10 +339,9 @@ int attack_command(const BusOptions &options)
         throw InputError("unknown fault \"" + options.fault
                          + "\"; known are babble, crc, stale, early, duplicate, sync, garbage");
     }
-    const Design design   = load_design(options.run.design);
-    Scenario     scenario = load_scenario(options.run.input, design);
-    scenario.seed         = options.run.seed.value_or(scenario.seed);
-    BusAttacker attacker(options, design, scenario);
+    const Design   design   = load_design(options.run.design);
+    const Scenario scenario = load_scenario(options.run.input, design, options.run.seed);
+    BusAttacker    attacker(options, design, scenario);
     say_listening("attack", options.link);
     attacker.run();
     std::cout << attacker.report().dump() << "\n";

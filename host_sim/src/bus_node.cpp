@@ -239,9 +239,8 @@ Trace match(const Trace &trace, const Log &log)
 void score_run(const BusOptions &options, const Design &design, const Nodes &nodes,
                const std::vector<std::string> &methods, Session &session)
 {
-    Scenario scenario = load_scenario(options.run.input, design);
-    scenario.seed     = options.run.seed.value_or(scenario.seed);
-    Log log           = read_log(options.log, design);
+    const Scenario scenario = load_scenario(options.run.input, design, options.run.seed);
+    Log            log      = read_log(options.log, design);
     attack_log(log, design, scenario.attacks, scenario.seed);
     Bench oracle(design, {}, false);
     replay(log, oracle);

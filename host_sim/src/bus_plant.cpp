@@ -160,10 +160,9 @@ private:
 
 int plant_command(const BusOptions &options)
 {
-    const Design design   = load_design(options.run.design);
-    Scenario     scenario = load_scenario(options.run.input, design);
-    scenario.seed         = options.run.seed.value_or(scenario.seed);
-    BusPlant plant(options, design, scenario);
+    const Design   design   = load_design(options.run.design);
+    const Scenario scenario = load_scenario(options.run.input, design, options.run.seed);
+    BusPlant       plant(options, design, scenario);
     say_listening("plant", options.link);
 
     const std::optional<Divergence> divergence = plant.run();

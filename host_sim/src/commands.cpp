@@ -58,8 +58,7 @@ Json divergence_json(const std::optional<Divergence> &divergence)
 int run_command(const Options &options)
 {
     const Design design   = load_design(options.design);
-    Scenario     scenario = load_scenario(options.input, design);
-    scenario.seed         = options.seed.value_or(scenario.seed);
+    Scenario     scenario = load_scenario(options.input, design, options.seed);
     scenario.runs         = options.runs.value_or(scenario.runs);
     Bench   bench(design, choose_methods(options, design, scenario.controller.method),
                   options.compare);

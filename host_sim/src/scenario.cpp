@@ -83,7 +83,8 @@ void parse_initial(const TomlTable &file, const Design &design, Scenario &scenar
 
 } // namespace
 
-Scenario load_scenario(const std::string &path, const Design &design)
+Scenario load_scenario(const std::string &path, const Design &design,
+                       const std::optional<std::uint64_t> &seed)
 {
     const toml::table root = read_toml(path);
     const TomlTable   file(
@@ -94,7 +95,7 @@ Scenario load_scenario(const std::string &path, const Design &design)
     scenario.path = path;
     parse_count(file, "steps", scenario.steps);
     parse_count(file, "runs", scenario.runs);
-    scenario.seed        = file.integer("seed").value_or(scenario.seed);
+    scenario.seed        = seed.value_or(file.integer("seed").value_or(scenario.seed));
     scenario.diverged_at = file.number("diverged_at").value_or(scenario.diverged_at);
     if (!(scenario.diverged_at > 0.0)) {
         file.fail("diverged_at", "must be positive");

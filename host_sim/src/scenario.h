@@ -18,6 +18,7 @@
 #include "controller.h"
 #include "design.h"
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,8 +37,10 @@ struct Scenario {
     std::vector<AttackSpec> attacks;
 };
 
-/** Read and check a scenario for that design; InputError with file, line and column. */
-Scenario load_scenario(const std::string &path, const Design &design);
+/** Read and check a scenario for that design; InputError with file, line and column.
+ *  @param seed instead of the file's */
+Scenario load_scenario(const std::string &path, const Design &design,
+                       const std::optional<std::uint64_t> &seed);
 
 } // namespace sim
 #endif

@@ -12,6 +12,7 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import click
 from tqdm import tqdm
@@ -41,6 +42,23 @@ def simulator(precision: str) -> Path:
 def bus(precision: str) -> Path:
     """The program of plant, node and attacker on a bus; as simulator()."""
     return _program("blw_bus", precision)
+
+
+def arguments(options: dict[str, Any]) -> list[str]:
+    """Options of the simulator or of the program on the bus: those that were given.
+
+    A tuple becomes one word with commas; what is None or False was not given.
+    """
+    given: list[str] = []
+    for key, value in options.items():
+        option = "--" + key.replace("_", "-")
+        if value is True:
+            given.append(option)
+        elif isinstance(value, tuple):
+            given += [option, ",".join(value)]
+        elif value is not None and value is not False:
+            given += [option, str(value)]
+    return given
 
 
 def _program(name: str, precision: str) -> Path:

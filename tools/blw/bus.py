@@ -15,7 +15,7 @@ from typing import Any
 import click
 
 from blw.atomic import write_files
-from blw.build import PRECISIONS, bus
+from blw.build import PRECISIONS, arguments, bus
 from blw.errors import BulwarkError
 
 EXISTING_FILE = click.Path(path_type=Path, exists=True, dir_okay=False)
@@ -66,7 +66,7 @@ def _results() -> tuple[Callable, Callable]:
           click.option("--patience-ms", type=click.IntRange(min=1), help="For an answer."))
 def plant(scenario: Path, precision: str, **options: Any) -> int:
     """Simulate the plant of SCENARIO and its sensors on a bus."""
-    return subprocess.call([bus(precision), "plant", scenario, *_arguments(options)])
+    return subprocess.call([bus(precision), "plant", scenario, *arguments(options)])
 
 
 @click.command()
@@ -91,7 +91,7 @@ def plant(scenario: Path, precision: str, **options: Any) -> int:
                        help="Steps made up for blindly after a loss of contact."))
 def node(precision: str, **options: Any) -> int:
     """Estimate from what is heard on a bus, one node per method."""
-    return subprocess.call([bus(precision), "node", *_arguments(options)])
+    return subprocess.call([bus(precision), "node", *arguments(options)])
 
 
 @click.command()
@@ -101,21 +101,7 @@ def node(precision: str, **options: Any) -> int:
           click.option("--fault", type=click.Choice(FAULTS), help="Disturb instead of attacking."))
 def attack(scenario: Path, precision: str, **options: Any) -> int:
     """Carry out the attacks of SCENARIO on a bus."""
-    return subprocess.call([bus(precision), "attack", scenario, *_arguments(options)])
-
-
-def _arguments(options: dict[str, Any]) -> list[str]:
-    """Options of blw_bus: those that were given."""
-    arguments: list[str] = []
-    for key, value in options.items():
-        option = "--" + key.replace("_", "-")
-        if value is True:
-            arguments.append(option)
-        elif isinstance(value, tuple):
-            arguments += [option, ",".join(value)]
-        elif value is not None and value is not False:
-            arguments += [option, str(value)]
-    return arguments
+    return subprocess.call([bus(precision), "attack", scenario, *arguments(options)])
 
 
 @dataclass(frozen=True)
@@ -141,12 +127,12 @@ def run_on_bus(scenario: Path, design: Path, out: Path, methods: Sequence[str], 
     """
     program = bus(precision)
     attacked = bool(tomllib.loads(scenario.read_text(encoding="utf-8")).get("attack"))
-    common = _arguments({"design": design, "seed": seed})
+    common = arguments({"design": design, "seed": seed})
     plant_out = out / "plant"
     (plant_out / "log.csv").unlink(missing_ok=True)
     commands = {"node": ["--link", place.link, "--out", out, "--method", ",".join(methods),
                          "--scenario", scenario, "--log", plant_out / "log.csv", *common,
-                         *_arguments({"speaker": speaker or None, "json": as_json})]}
+                         *arguments({"speaker": speaker or None, "json": as_json})]}
     if attacked:
         commands["attack"] = [scenario, "--link", place.link, "--sensor-link", place.sensor_link,
                               *common]
@@ -154,8 +140,8 @@ def run_on_bus(scenario: Path, design: Path, out: Path, methods: Sequence[str], 
                          "--out", plant_out, *common]
     parts: dict[str, subprocess.Popen] = {}
     try:
-        for name, arguments in commands.items():
-            parts[name] = _start([program, name, *arguments])
+        for name, words in commands.items():
+            parts[name] = _start([program, name, *words])
             if not _is_listening(parts[name]):
                 return _end(parts, name)
         return _finish(parts, out)

@@ -16,7 +16,7 @@ import click
 
 from blw import pil
 from blw.atomic import write_files
-from blw.build import PRECISIONS, simulator
+from blw.build import PRECISIONS, arguments, simulator
 from blw.bus import LINKS, Place, run_on_bus
 from blw.design import design_all, document, json_text
 from blw.errors import BulwarkError
@@ -97,7 +97,12 @@ def replay(log: Path, design: Path, log_map: Path | None, log_format: str,
 
 def _replay_csv(log: Path, precision: str, **options: Any) -> int:
     return subprocess.call([simulator(precision), "replay", log,
-                            *_arguments({"format": "csv", **options})])
+                            *_words(format="csv", **options)])
+
+
+def _words(methods: Sequence[str], as_json: bool = False, **options: Any) -> list[str]:
+    """Options under their names on the simulator's command line."""
+    return arguments({"method": tuple(methods), "json": as_json, **options})
 
 
 def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METHOD,),
@@ -123,8 +128,8 @@ def run_scenario(scenario: Path, out: Path, methods: Sequence[str] = (EVERY_METH
     with tempfile.TemporaryDirectory(prefix="bulwark.") as folder:
         (design,) = write_files(Path(folder), {name: text})
         if transport == "inproc":
-            arguments = _arguments({"design": design, "out": out, "methods": methods, **options})
-            status = subprocess.call([simulator(precision), "run", scenario, *arguments])
+            status = subprocess.call([simulator(precision), "run", scenario, *_words(
+                design=design, out=out, methods=methods, **options)])
         else:
             status = run_on_bus(scenario, design, out, methods, _speaker(methods, controller),
                                 Place.of(transport, *links), precision, options.get("seed"),
@@ -186,18 +191,3 @@ def _wanted(methods: Sequence[str], controller: str) -> list[str] | None:
         return None
     return list(dict.fromkeys(["kalman", *methods] + [name for name in REGISTRY
                                                       if name == controller]))
-
-
-def _arguments(options: dict[str, Any]) -> list[str]:
-    """Options of blw_sim: those that were given, under their names there."""
-    names = {"methods": "method", "as_json": "json", "attack_id": "attack-id"}
-    arguments: list[str] = []
-    for key, value in options.items():
-        option = "--" + names.get(key, key)
-        if value is True:
-            arguments.append(option)
-        elif isinstance(value, tuple):
-            arguments += [option, ",".join(value)]
-        elif value is not None and value is not False:
-            arguments += [option, str(value)]
-    return arguments
