@@ -120,7 +120,7 @@ static blw_real_t norm_of_z(const blw_l1_t *self)
 }
 
 /* The gap (5) and the bound (6). */
-static void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
+static BLW_APART void report_gap(const blw_l1_t *self, const blw_real_t *zeta, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m   = self->model;
     const blw_real_t            z   = norm_of_z(self);

@@ -119,7 +119,7 @@ static bool transform_sensor(blw_lasso_t *self, size_t i)
 /* xi of all sensors.  A filter that a sample throws out of bounds starts again from the prediction,
  * and the sample counts as missing.
  * @return the samples that were taken in. */
-static blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used)
+static BLW_APART blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used)
 {
     const blw_jordan_model_t *const jordan = self->model->jordan;
     const size_t                    r      = jordan->r;
@@ -137,7 +137,7 @@ static blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used)
 
 /* (2) and (3): the estimate, which is the reference of the next step.
  * @return false if the fusion overflowed: the estimate is then the prediction. */
-static bool move_reference(blw_lasso_t *self)
+static BLW_APART bool move_reference(blw_lasso_t *self)
 {
     const blw_jordan_model_t *const jordan = self->model->jordan;
     const size_t                    n      = self->model->head.plant->n;
@@ -156,7 +156,7 @@ static bool move_reference(blw_lasso_t *self)
     return true;
 }
 
-static void judge_sensors(blw_lasso_t *self, blw_mask_t used)
+static BLW_APART void judge_sensors(blw_lasso_t *self, blw_mask_t used)
 {
     const size_t r = self->model->jordan->r;
 
@@ -176,8 +176,8 @@ static blw_outcome_t outcome_of(const blw_l1_info_t *info)
     return info->converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND;
 }
 
-static void report(const blw_lasso_t *self, const blw_l1_info_t *info, blw_mask_t used,
-                   blw_estimator_out_t *out)
+static BLW_APART void report(const blw_lasso_t *self, const blw_l1_info_t *info, blw_mask_t used,
+                             blw_estimator_out_t *out)
 {
     *out = (blw_estimator_out_t){
         .x_hat      = self->x_hat,

@@ -24,6 +24,14 @@ def test_deepest_given_a_pointer_takes_the_deepest_function_it_may_mean():
     assert made.deepest("root") == 8 + 100 + 20
 
 
+def test_deepest_given_a_pointer_does_not_return_to_its_own_file():
+    made = graph({"root": 8, "e.c:multiply": 10, "e.c:solve": 100, "kernel": 20},
+                 {"root": [POINTER], "e.c:multiply": [POINTER],
+                  POINTER: ["e.c:multiply", "e.c:solve", "kernel"]})
+    assert made.deepest("root") == 8 + 100
+    assert made.deepest("e.c:multiply") == 10 + 20
+
+
 def test_deepest_given_recursion_fails_by_name():
     made = graph({"root": 8, "a": 16}, {"root": ["a"], "a": ["root"]})
     with pytest.raises(StepFailed, match="recursion: root -> a -> root"):

@@ -5,7 +5,8 @@ Routines of the compiler's library have no such graph; theirs is read off the di
 sum over all of a routine's pushes is an upper bound.  A call through a pointer may go to any
 straight-line kernel of the model that the linker kept, and to any function of the const objects
 <name>_ops in which modules offer themselves to each other; not back to where it comes from, since
-the library has no recursion.  Recursion and a frame of unknown size are errors, not guesses.
+the library has no recursion, nor to its own file, where calls have names.  Recursion and a frame of
+unknown size are errors, not guesses.
 """
 
 import re
@@ -45,9 +46,14 @@ class CallGraph:
             raise StepFailed(f"the stack of {root} is not known")
         callees = self.calls.get(root, set())
         if root == _POINTER:
-            callees = callees.difference(path)
+            callees = {name for name in callees.difference(path) if not _share_file(name, path[-1])}
         below = (self.deepest(callee, (*path, root)) for callee in callees)
         return self.frames[root] + max(below, default=0)
+
+
+def _share_file(one: str, other: str) -> bool:
+    """Both are static functions of one source: gcc calls them FILE:NAME."""
+    return ":" in one and one.partition(":")[0] == other.partition(":")[0]
 
 
 def stack_bytes(program: Program, owner: str) -> int:
