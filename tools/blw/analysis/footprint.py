@@ -78,7 +78,8 @@ def _kalman(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
 def _lasso(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
     """The filters, P and the certificate; then max_iterations of the engine.  A pivot on the
     tableau updates half of it; one on Z is a product in both directions and a solve with the
-    largest support; a pass of ADMM is a product."""
+    largest support; a Newton step factors the conditions of all rows anew; a pass of ADMM is a
+    product."""
     n, _, N, d, groups, has_P = designed.mem
     tables = designed.tables.to_json()
     r = tables["jordan"]["r"]
@@ -87,10 +88,10 @@ def _lasso(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
     bands = sum(bool(np.any(tables["jordan"][band])) for band in ("J0", "J1", "J2", "Jm"))
     filters = N * (bands + 1 + plant["l"]) + (N * r if has_P else 0)
     engine = tables["l1"]["engine"]
-    S = N * N if engine == "tableau" else 2 * z_length
+    S = N * N if tables["l1"]["Z"] is None else 2 * z_length
     typical = _predict(plant) + plant["m"] * plant["n"] + filters + S + 2 * N * n
     pivot = {"tableau": N * (N + 1) // 2, "active_set": 2 * z_length + rows * (rows + d),
-             "admm": N * N}[engine]
+             "newton": N**3 // 6 + 2 * N * N, "admm": N * N}[engine]
     return typical, typical + tables["l1"]["max_iterations"] * pivot
 
 
