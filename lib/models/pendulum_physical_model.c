@@ -493,7 +493,7 @@ static const blw_real_t canonical_l1_P[10] = {
 };
 
 /* y = S x: 256 multiply-adds */
-static void canonical_l1_symv(const blw_real_t *S, const blw_real_t *x, blw_real_t *y)
+static void canonical_l1_fast_symv(const blw_real_t *S, const blw_real_t *x, blw_real_t *y)
 {
     const blw_real_t x0 = x[0];
     const blw_real_t x1 = x[1];
@@ -610,9 +610,121 @@ static void canonical_l1_symv(const blw_real_t *S, const blw_real_t *x, blw_real
     y[15] = y15;
 }
 
-/* T -= share col col': 136 multiply-adds */
-static void canonical_l1_reduce(const blw_real_t *col, blw_real_t share, blw_real_t *T)
+/* column k of T */
+static void canonical_l1_fast_column(size_t k, const blw_real_t *T, blw_real_t *col)
 {
+    const blw_real_t *const row = &T[(k * (k + 1U)) / 2U];
+    const blw_real_t *const below = &T[k];
+
+    switch (k) {
+    case 15U:
+        col[15] = row[15];
+        /* fall through */
+    case 14U:
+        col[14] = row[14];
+        /* fall through */
+    case 13U:
+        col[13] = row[13];
+        /* fall through */
+    case 12U:
+        col[12] = row[12];
+        /* fall through */
+    case 11U:
+        col[11] = row[11];
+        /* fall through */
+    case 10U:
+        col[10] = row[10];
+        /* fall through */
+    case 9U:
+        col[9] = row[9];
+        /* fall through */
+    case 8U:
+        col[8] = row[8];
+        /* fall through */
+    case 7U:
+        col[7] = row[7];
+        /* fall through */
+    case 6U:
+        col[6] = row[6];
+        /* fall through */
+    case 5U:
+        col[5] = row[5];
+        /* fall through */
+    case 4U:
+        col[4] = row[4];
+        /* fall through */
+    case 3U:
+        col[3] = row[3];
+        /* fall through */
+    case 2U:
+        col[2] = row[2];
+        /* fall through */
+    case 1U:
+        col[1] = row[1];
+        /* fall through */
+    case 0U:
+        col[0] = row[0];
+        /* fall through */
+    default:
+        break;
+    }
+    switch (k) {
+    case 0U:
+        col[1] = below[1];
+        /* fall through */
+    case 1U:
+        col[2] = below[3];
+        /* fall through */
+    case 2U:
+        col[3] = below[6];
+        /* fall through */
+    case 3U:
+        col[4] = below[10];
+        /* fall through */
+    case 4U:
+        col[5] = below[15];
+        /* fall through */
+    case 5U:
+        col[6] = below[21];
+        /* fall through */
+    case 6U:
+        col[7] = below[28];
+        /* fall through */
+    case 7U:
+        col[8] = below[36];
+        /* fall through */
+    case 8U:
+        col[9] = below[45];
+        /* fall through */
+    case 9U:
+        col[10] = below[55];
+        /* fall through */
+    case 10U:
+        col[11] = below[66];
+        /* fall through */
+    case 11U:
+        col[12] = below[78];
+        /* fall through */
+    case 12U:
+        col[13] = below[91];
+        /* fall through */
+    case 13U:
+        col[14] = below[105];
+        /* fall through */
+    case 14U:
+        col[15] = below[120];
+        /* fall through */
+    default:
+        break;
+    }
+}
+
+/* T swept on row k: 136 multiply-adds */
+static void canonical_l1_fast_sweep(size_t k, blw_real_t share, const blw_real_t *col, blw_real_t *T)
+{
+    const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;
+    blw_real_t *const row = &T[(k * (k + 1U)) / 2U];
+    blw_real_t *const below = &T[k];
     const blw_real_t x0 = col[0];
     const blw_real_t x1 = col[1];
     const blw_real_t x2 = col[2];
@@ -629,6 +741,7 @@ static void canonical_l1_reduce(const blw_real_t *col, blw_real_t share, blw_rea
     const blw_real_t x13 = col[13];
     const blw_real_t x14 = col[14];
     const blw_real_t x15 = col[15];
+
     const blw_real_t a0 = x0 * share;
     T[0] -= a0 * x0;
     const blw_real_t a1 = x1 * share;
@@ -781,7 +894,300 @@ static void canonical_l1_reduce(const blw_real_t *col, blw_real_t share, blw_rea
     T[133] -= a15 * x13;
     T[134] -= a15 * x14;
     T[135] -= a15 * x15;
+
+    switch (k) {
+    case 15U:
+        row[15] = factor * x15;
+        /* fall through */
+    case 14U:
+        row[14] = factor * x14;
+        /* fall through */
+    case 13U:
+        row[13] = factor * x13;
+        /* fall through */
+    case 12U:
+        row[12] = factor * x12;
+        /* fall through */
+    case 11U:
+        row[11] = factor * x11;
+        /* fall through */
+    case 10U:
+        row[10] = factor * x10;
+        /* fall through */
+    case 9U:
+        row[9] = factor * x9;
+        /* fall through */
+    case 8U:
+        row[8] = factor * x8;
+        /* fall through */
+    case 7U:
+        row[7] = factor * x7;
+        /* fall through */
+    case 6U:
+        row[6] = factor * x6;
+        /* fall through */
+    case 5U:
+        row[5] = factor * x5;
+        /* fall through */
+    case 4U:
+        row[4] = factor * x4;
+        /* fall through */
+    case 3U:
+        row[3] = factor * x3;
+        /* fall through */
+    case 2U:
+        row[2] = factor * x2;
+        /* fall through */
+    case 1U:
+        row[1] = factor * x1;
+        /* fall through */
+    case 0U:
+        row[0] = factor * x0;
+        /* fall through */
+    default:
+        break;
+    }
+    row[k] = -share;
+    switch (k) {
+    case 0U:
+        below[1] = factor * x1;
+        /* fall through */
+    case 1U:
+        below[3] = factor * x2;
+        /* fall through */
+    case 2U:
+        below[6] = factor * x3;
+        /* fall through */
+    case 3U:
+        below[10] = factor * x4;
+        /* fall through */
+    case 4U:
+        below[15] = factor * x5;
+        /* fall through */
+    case 5U:
+        below[21] = factor * x6;
+        /* fall through */
+    case 6U:
+        below[28] = factor * x7;
+        /* fall through */
+    case 7U:
+        below[36] = factor * x8;
+        /* fall through */
+    case 8U:
+        below[45] = factor * x9;
+        /* fall through */
+    case 9U:
+        below[55] = factor * x10;
+        /* fall through */
+    case 10U:
+        below[66] = factor * x11;
+        /* fall through */
+    case 11U:
+        below[78] = factor * x12;
+        /* fall through */
+    case 12U:
+        below[91] = factor * x13;
+        /* fall through */
+    case 13U:
+        below[105] = factor * x14;
+        /* fall through */
+    case 14U:
+        below[120] = factor * x15;
+        /* fall through */
+    default:
+        break;
+    }
 }
+
+/* z = l - t col, surveyed */
+static void canonical_l1_fast_advance(const struct blw_l1 *self, blw_real_t t, blw_real_t share,
+    blw_l1_survey_t *seen)
+{
+    const blw_real_t *const l = self->l;
+    const blw_real_t *const limit = self->tau;
+    const blw_real_t *const dir = self->dir;
+    const blw_real_t *const col = self->step;
+    const blw_real_t *const T = self->L;
+    blw_real_t *const z = self->z;
+    blw_l1_survey_t found = {16U, BLW_R(0.0), BLW_R(1.0), false};
+
+    const blw_real_t v0 = l[0] - (t * col[0]);
+    z[0] = v0;
+    blw_l1_look(&found, 0U, v0, limit[0], &dir[0], &T[0], &col[0], share);
+    const blw_real_t v1 = l[1] - (t * col[1]);
+    z[1] = v1;
+    blw_l1_look(&found, 1U, v1, limit[1], &dir[1], &T[2], &col[1], share);
+    const blw_real_t v2 = l[2] - (t * col[2]);
+    z[2] = v2;
+    blw_l1_look(&found, 2U, v2, limit[2], &dir[2], &T[5], &col[2], share);
+    const blw_real_t v3 = l[3] - (t * col[3]);
+    z[3] = v3;
+    blw_l1_look(&found, 3U, v3, limit[3], &dir[3], &T[9], &col[3], share);
+    const blw_real_t v4 = l[4] - (t * col[4]);
+    z[4] = v4;
+    blw_l1_look(&found, 4U, v4, limit[4], &dir[4], &T[14], &col[4], share);
+    const blw_real_t v5 = l[5] - (t * col[5]);
+    z[5] = v5;
+    blw_l1_look(&found, 5U, v5, limit[5], &dir[5], &T[20], &col[5], share);
+    const blw_real_t v6 = l[6] - (t * col[6]);
+    z[6] = v6;
+    blw_l1_look(&found, 6U, v6, limit[6], &dir[6], &T[27], &col[6], share);
+    const blw_real_t v7 = l[7] - (t * col[7]);
+    z[7] = v7;
+    blw_l1_look(&found, 7U, v7, limit[7], &dir[7], &T[35], &col[7], share);
+    const blw_real_t v8 = l[8] - (t * col[8]);
+    z[8] = v8;
+    blw_l1_look(&found, 8U, v8, limit[8], &dir[8], &T[44], &col[8], share);
+    const blw_real_t v9 = l[9] - (t * col[9]);
+    z[9] = v9;
+    blw_l1_look(&found, 9U, v9, limit[9], &dir[9], &T[54], &col[9], share);
+    const blw_real_t v10 = l[10] - (t * col[10]);
+    z[10] = v10;
+    blw_l1_look(&found, 10U, v10, limit[10], &dir[10], &T[65], &col[10], share);
+    const blw_real_t v11 = l[11] - (t * col[11]);
+    z[11] = v11;
+    blw_l1_look(&found, 11U, v11, limit[11], &dir[11], &T[77], &col[11], share);
+    const blw_real_t v12 = l[12] - (t * col[12]);
+    z[12] = v12;
+    blw_l1_look(&found, 12U, v12, limit[12], &dir[12], &T[90], &col[12], share);
+    const blw_real_t v13 = l[13] - (t * col[13]);
+    z[13] = v13;
+    blw_l1_look(&found, 13U, v13, limit[13], &dir[13], &T[104], &col[13], share);
+    const blw_real_t v14 = l[14] - (t * col[14]);
+    z[14] = v14;
+    blw_l1_look(&found, 14U, v14, limit[14], &dir[14], &T[119], &col[14], share);
+    const blw_real_t v15 = l[15] - (t * col[15]);
+    z[15] = v15;
+    blw_l1_look(&found, 15U, v15, limit[15], &dir[15], &T[135], &col[15], share);
+    *seen = found;
+}
+
+/* out = F v */
+static void canonical_l1_fast_fuse(const blw_real_t *M, const blw_real_t *v, blw_real_t *out)
+{
+    const blw_real_t v0 = v[0];
+    const blw_real_t v1 = v[1];
+    const blw_real_t v2 = v[2];
+    const blw_real_t v3 = v[3];
+    const blw_real_t v4 = v[4];
+    const blw_real_t v5 = v[5];
+    const blw_real_t v6 = v[6];
+    const blw_real_t v7 = v[7];
+    const blw_real_t v8 = v[8];
+    const blw_real_t v9 = v[9];
+    const blw_real_t v10 = v[10];
+    const blw_real_t v11 = v[11];
+    const blw_real_t v12 = v[12];
+    const blw_real_t v13 = v[13];
+    const blw_real_t v14 = v[14];
+    const blw_real_t v15 = v[15];
+    out[0] = (M[0] * v0) + (M[1] * v1) + (M[2] * v2) + (M[3] * v3) + (M[4] * v4) + (M[5] * v5) +
+        (M[6] * v6) + (M[7] * v7) + (M[8] * v8) + (M[9] * v9) + (M[10] * v10) + (M[11] * v11) +
+        (M[12] * v12) + (M[13] * v13) + (M[14] * v14) + (M[15] * v15);
+    out[1] = (M[16] * v0) + (M[17] * v1) + (M[18] * v2) + (M[19] * v3) + (M[20] * v4) + (M[21] * v5)
+        + (M[22] * v6) + (M[23] * v7) + (M[24] * v8) + (M[25] * v9) + (M[26] * v10) + (M[27] * v11)
+        + (M[28] * v12) + (M[29] * v13) + (M[30] * v14) + (M[31] * v15);
+    out[2] = (M[32] * v0) + (M[33] * v1) + (M[34] * v2) + (M[35] * v3) + (M[36] * v4) + (M[37] * v5)
+        + (M[38] * v6) + (M[39] * v7) + (M[40] * v8) + (M[41] * v9) + (M[42] * v10) + (M[43] * v11)
+        + (M[44] * v12) + (M[45] * v13) + (M[46] * v14) + (M[47] * v15);
+    out[3] = (M[48] * v0) + (M[49] * v1) + (M[50] * v2) + (M[51] * v3) + (M[52] * v4) + (M[53] * v5)
+        + (M[54] * v6) + (M[55] * v7) + (M[56] * v8) + (M[57] * v9) + (M[58] * v10) + (M[59] * v11)
+        + (M[60] * v12) + (M[61] * v13) + (M[62] * v14) + (M[63] * v15);
+}
+
+/* out = F' v */
+static void canonical_l1_fast_spread(const blw_real_t *M, const blw_real_t *v, blw_real_t *out)
+{
+    const blw_real_t v0 = v[0];
+    const blw_real_t v1 = v[1];
+    const blw_real_t v2 = v[2];
+    const blw_real_t v3 = v[3];
+    out[0] = (M[0] * v0) + (M[16] * v1) + (M[32] * v2) + (M[48] * v3);
+    out[1] = (M[1] * v0) + (M[17] * v1) + (M[33] * v2) + (M[49] * v3);
+    out[2] = (M[2] * v0) + (M[18] * v1) + (M[34] * v2) + (M[50] * v3);
+    out[3] = (M[3] * v0) + (M[19] * v1) + (M[35] * v2) + (M[51] * v3);
+    out[4] = (M[4] * v0) + (M[20] * v1) + (M[36] * v2) + (M[52] * v3);
+    out[5] = (M[5] * v0) + (M[21] * v1) + (M[37] * v2) + (M[53] * v3);
+    out[6] = (M[6] * v0) + (M[22] * v1) + (M[38] * v2) + (M[54] * v3);
+    out[7] = (M[7] * v0) + (M[23] * v1) + (M[39] * v2) + (M[55] * v3);
+    out[8] = (M[8] * v0) + (M[24] * v1) + (M[40] * v2) + (M[56] * v3);
+    out[9] = (M[9] * v0) + (M[25] * v1) + (M[41] * v2) + (M[57] * v3);
+    out[10] = (M[10] * v0) + (M[26] * v1) + (M[42] * v2) + (M[58] * v3);
+    out[11] = (M[11] * v0) + (M[27] * v1) + (M[43] * v2) + (M[59] * v3);
+    out[12] = (M[12] * v0) + (M[28] * v1) + (M[44] * v2) + (M[60] * v3);
+    out[13] = (M[13] * v0) + (M[29] * v1) + (M[45] * v2) + (M[61] * v3);
+    out[14] = (M[14] * v0) + (M[30] * v1) + (M[46] * v2) + (M[62] * v3);
+    out[15] = (M[15] * v0) + (M[31] * v1) + (M[47] * v2) + (M[63] * v3);
+}
+
+/* out += G v */
+static void canonical_l1_fast_predict(const blw_real_t *M, const blw_real_t *v, blw_real_t *out)
+{
+    const blw_real_t v0 = v[0];
+    const blw_real_t v1 = v[1];
+    const blw_real_t v2 = v[2];
+    const blw_real_t v3 = v[3];
+    out[0] += (M[0] * v0) + (M[1] * v1) + (M[2] * v2) + (M[3] * v3);
+    out[1] += (M[4] * v0) + (M[5] * v1) + (M[6] * v2) + (M[7] * v3);
+    out[2] += (M[8] * v0) + (M[9] * v1) + (M[10] * v2) + (M[11] * v3);
+    out[3] += (M[12] * v0) + (M[13] * v1) + (M[14] * v2) + (M[15] * v3);
+    out[4] += (M[16] * v0) + (M[17] * v1) + (M[18] * v2) + (M[19] * v3);
+    out[5] += (M[20] * v0) + (M[21] * v1) + (M[22] * v2) + (M[23] * v3);
+    out[6] += (M[24] * v0) + (M[25] * v1) + (M[26] * v2) + (M[27] * v3);
+    out[7] += (M[28] * v0) + (M[29] * v1) + (M[30] * v2) + (M[31] * v3);
+    out[8] += (M[32] * v0) + (M[33] * v1) + (M[34] * v2) + (M[35] * v3);
+    out[9] += (M[36] * v0) + (M[37] * v1) + (M[38] * v2) + (M[39] * v3);
+    out[10] += (M[40] * v0) + (M[41] * v1) + (M[42] * v2) + (M[43] * v3);
+    out[11] += (M[44] * v0) + (M[45] * v1) + (M[46] * v2) + (M[47] * v3);
+    out[12] += (M[48] * v0) + (M[49] * v1) + (M[50] * v2) + (M[51] * v3);
+    out[13] += (M[52] * v0) + (M[53] * v1) + (M[54] * v2) + (M[55] * v3);
+    out[14] += (M[56] * v0) + (M[57] * v1) + (M[58] * v2) + (M[59] * v3);
+    out[15] += (M[60] * v0) + (M[61] * v1) + (M[62] * v2) + (M[63] * v3);
+}
+
+/* out = -G' v */
+static void canonical_l1_fast_balance(const blw_real_t *M, const blw_real_t *v, blw_real_t *out)
+{
+    const blw_real_t v0 = v[0];
+    const blw_real_t v1 = v[1];
+    const blw_real_t v2 = v[2];
+    const blw_real_t v3 = v[3];
+    const blw_real_t v4 = v[4];
+    const blw_real_t v5 = v[5];
+    const blw_real_t v6 = v[6];
+    const blw_real_t v7 = v[7];
+    const blw_real_t v8 = v[8];
+    const blw_real_t v9 = v[9];
+    const blw_real_t v10 = v[10];
+    const blw_real_t v11 = v[11];
+    const blw_real_t v12 = v[12];
+    const blw_real_t v13 = v[13];
+    const blw_real_t v14 = v[14];
+    const blw_real_t v15 = v[15];
+    out[0] = -((M[0] * v0) + (M[4] * v1) + (M[8] * v2) + (M[12] * v3) + (M[16] * v4) + (M[20] * v5)
+        + (M[24] * v6) + (M[28] * v7) + (M[32] * v8) + (M[36] * v9) + (M[40] * v10) + (M[44] * v11)
+        + (M[48] * v12) + (M[52] * v13) + (M[56] * v14) + (M[60] * v15));
+    out[1] = -((M[1] * v0) + (M[5] * v1) + (M[9] * v2) + (M[13] * v3) + (M[17] * v4) + (M[21] * v5)
+        + (M[25] * v6) + (M[29] * v7) + (M[33] * v8) + (M[37] * v9) + (M[41] * v10) + (M[45] * v11)
+        + (M[49] * v12) + (M[53] * v13) + (M[57] * v14) + (M[61] * v15));
+    out[2] = -((M[2] * v0) + (M[6] * v1) + (M[10] * v2) + (M[14] * v3) + (M[18] * v4) + (M[22] * v5)
+        + (M[26] * v6) + (M[30] * v7) + (M[34] * v8) + (M[38] * v9) + (M[42] * v10) + (M[46] * v11)
+        + (M[50] * v12) + (M[54] * v13) + (M[58] * v14) + (M[62] * v15));
+    out[3] = -((M[3] * v0) + (M[7] * v1) + (M[11] * v2) + (M[15] * v3) + (M[19] * v4) + (M[23] * v5)
+        + (M[27] * v6) + (M[31] * v7) + (M[35] * v8) + (M[39] * v9) + (M[43] * v10) + (M[47] * v11)
+        + (M[51] * v12) + (M[55] * v13) + (M[59] * v14) + (M[63] * v15));
+}
+
+static const blw_l1_kernels_t canonical_l1_fast = {
+    .symv    = canonical_l1_fast_symv,
+    .column  = canonical_l1_fast_column,
+    .sweep   = canonical_l1_fast_sweep,
+    .advance = canonical_l1_fast_advance,
+    .fuse    = canonical_l1_fast_fuse,
+    .spread  = canonical_l1_fast_spread,
+    .predict = canonical_l1_fast_predict,
+    .balance = canonical_l1_fast_balance,
+};
 
 static const blw_l1_model_t canonical_l1 = {
     .N              = 16U,
@@ -799,8 +1205,7 @@ static const blw_l1_model_t canonical_l1 = {
     .W              = canonical_l1_W,
     .G              = canonical_l1_G,
     .P              = canonical_l1_P,
-    .symv           = canonical_l1_symv,
-    .reduce         = canonical_l1_reduce,
+    .fast           = &canonical_l1_fast,
     .rho            = BLW_R(0.0),
     .kappa_G        = BLW_R(0.14702559748531452),
     .kappa_W        = BLW_R(22.68104674346274),

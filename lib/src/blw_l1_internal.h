@@ -107,8 +107,8 @@ bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_re
 static inline void blw_l1_symv(const blw_l1_model_t *m, const blw_real_t *S, const blw_real_t *x,
                                blw_real_t *y)
 {
-    if (m->symv != NULL) {
-        m->symv(S, x, y);
+    if (m->fast != NULL) {
+        m->fast->symv(S, x, y);
     } else {
         blw_la_symv(m->N, S, x, y);
     }

@@ -79,6 +79,10 @@ void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h)
 {
     const size_t n = self->model->n;
 
+    if (self->model->fast != NULL) {
+        self->model->fast->balance(self->model->G, self->l, h);
+        return;
+    }
     for (size_t j = 0U; j < n; j++) {
         const blw_real_t *G   = &self->model->G[j];
         blw_real_t        sum = BLW_R(0.0);

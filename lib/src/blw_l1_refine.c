@@ -13,20 +13,56 @@
 
 bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta)
 {
+    const blw_l1_model_t *const m    = self->model;
+    const blw_real_t           *W_ii = m->W;
+    bool                        ok   = true;
+
+    for (size_t i = 0U; ok && (i < m->N); i++) {
+        if (blw_l1_clipped(self, i)) {
+            const blw_real_t slack = blw_la_abs(zeta[i]) + blw_la_abs(*W_ii * self->l[i]);
+            ok = ((zeta[i] - self->tau[i]) * self->dir[i]) >= -(NU_SLACK * slack);
+        } else {
+            ok = blw_la_abs(self->l[i]) <= (m->c[i] + blw_l1_slack(m->c[i]));
+        }
+        W_ii += i + 2U;
+    }
+    return ok;
+}
+
+/* out = F v. */
+static void fuse(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *out)
+{
+    if (m->fast != NULL) {
+        m->fast->fuse(m->F, v, out);
+    } else {
+        blw_la_gemv(m->n, m->N, m->F, v, out);
+    }
+}
+
+/* out = F' h. */
+static void spread(const blw_l1_model_t *m, const blw_real_t *h, blw_real_t *out)
+{
+    if (m->fast != NULL) {
+        m->fast->spread(m->F, h, out);
+        return;
+    }
+    blw_la_fill(m->N, BLW_R(0.0), out);
+    for (size_t j = 0U; j < m->n; j++) {
+        blw_la_axpy(m->N, h[j], &m->F[j * m->N], out);
+    }
+}
+
+/* tau = W l + G x. */
+static void predict(blw_l1_t *self, const blw_real_t *x)
+{
     const blw_l1_model_t *const m = self->model;
 
-    for (size_t i = 0U; i < m->N; i++) {
-        if (blw_l1_clipped(self, i)) {
-            const blw_real_t own   = m->W[blw_la_packed_row(i) + i] * self->l[i];
-            const blw_real_t slack = blw_la_abs(zeta[i]) + blw_la_abs(own);
-            if (!(((zeta[i] - self->tau[i]) * self->dir[i]) >= -(NU_SLACK * slack))) {
-                return false;
-            }
-        } else if (!(blw_la_abs(self->l[i]) <= (m->c[i] + blw_l1_slack(m->c[i])))) {
-            return false;
-        }
+    blw_l1_symv(m, m->W, self->l, self->tau);
+    if (m->fast != NULL) {
+        m->fast->predict(m->G, x, self->tau);
+    } else {
+        blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
     }
-    return true;
 }
 
 /* From what the sweeps left: l_A = c_A s_A, tau = zeta - nu, x = F tau. */
@@ -41,7 +77,7 @@ static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
             self->l[i] = m->c[i] * self->dir[i];
         }
     }
-    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
+    fuse(m, self->tau, x);
 }
 
 /* One step of refinement with the inverse that T is a part of.  With e = zeta - tau outside A,
@@ -58,10 +94,7 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
     bool                        small  = true;
 
     blw_l1_imbalance(self, h);
-    blw_la_fill(m->N, BLW_R(0.0), self->step);
-    for (size_t j = 0U; j < m->n; j++) {
-        blw_la_axpy(m->N, h[j], &m->F[j * m->N], self->step);
-    }
+    spread(m, h, self->step);
     for (size_t i = 0U; i < m->N; i++) {
         const bool clipped = blw_l1_clipped(self, i);
         self->l[i] += clipped ? BLW_R(0.0) : self->step[i];
@@ -78,8 +111,9 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
         }
     }
     blw_la_symv(m->n, m->P, h, change);
+    fuse(m, self->step, h);
     for (size_t j = 0U; j < m->n; j++) {
-        const blw_real_t dx   = blw_la_dot(m->N, &m->F[j * m->N], self->step) - change[j];
+        const blw_real_t dx   = h[j] - change[j];
         const blw_real_t P_jj = m->P[blw_la_packed_row(j) + j];
         x[j] += dx;
         sum += dx * dx;
@@ -91,13 +125,11 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
 
 bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
 {
-    const blw_l1_model_t *const m       = self->model;
-    bool                        settled = false;
+    bool settled = false;
 
     split(self, zeta, x);
     for (size_t round = 0U; (round < REFINEMENTS) && !settled; round++) {
-        blw_l1_symv(m, m->W, self->l, self->tau);
-        blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
+        predict(self, x);
         settled = correct(self, zeta, x, bound);
     }
     return settled ? blw_l1_holds(self, zeta) : blw_l1_kkt(self, zeta, x, bound);

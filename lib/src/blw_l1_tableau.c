@@ -11,11 +11,8 @@
  *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i or a nu_j vanishes, which then leaves.   (2)
  * The objective never rises.  The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is
  * verified by the solve of blw_l1_kkt.c, which shares no number with T. */
+#include "blw/blw_l1_survey.h"
 #include "blw_l1_internal.h"
-
-/* Least T_ii for a step that ends at |l_i| = c_i: the diagonal of S is about 1.  Below it row i depends
- * on A, and a row of A has to leave first. */
-#define PIVOT_MIN (BLW_R(64.0) * BLW_REAL_EPS)
 
 /* Limit of |l_i| that sends every row of A to the test of its sign. */
 #define ALWAYS BLW_R(-1.0)
@@ -28,6 +25,10 @@ static blw_real_t *row_of_T(const blw_l1_t *self, size_t i)
 /* Column k of T, whole. */
 static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
 {
+    if (self->model->fast != NULL) {
+        self->model->fast->column(k, self->L, col);
+        return;
+    }
     const size_t            N  = self->model->N;
     const blw_real_t *const Tk = row_of_T(self, k);
     size_t                  at = blw_la_packed_row(k + 1U) + k;
@@ -66,10 +67,6 @@ static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
     const size_t N = self->model->N;
     size_t       i = 0U;
 
-    if (self->model->reduce != NULL) {
-        self->model->reduce(col, share, self->L);
-        return;
-    }
     for (; (i + 3U) <= N; i += 3U) {
         reduce_rows(self, i, share, col);
     }
@@ -81,8 +78,13 @@ static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
 /* Sweep (1) on row k, into A or out of it; col = column k. */
 static void sweep(blw_l1_t *self, size_t k, const blw_real_t *col)
 {
+    const blw_real_t share = BLW_R(1.0) / col[k];
+
+    if (self->model->fast != NULL) {
+        self->model->fast->sweep(k, share, col, self->L);
+        return;
+    }
     const size_t     N      = self->model->N;
-    const blw_real_t share  = BLW_R(1.0) / col[k];
     const blw_real_t factor = blw_la_abs(share);
     blw_real_t      *Tk     = row_of_T(self, k);
 
@@ -106,7 +108,7 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     blw_real_t                  t = BLW_REAL_MAX;
 
     *block = i;
-    if (col[i] > PIVOT_MIN) {
+    if (col[i] > BLW_L1_PIVOT_MIN) {
         t = blw_la_max((s * self->l[i]) - m->c[i], BLW_R(0.0)) / col[i];
     }
     for (size_t j = 0U; j < m->N; j++) {
@@ -119,44 +121,24 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     return t;
 }
 
-/* A step of l and nu along column i of T, and what comes next. */
-typedef struct survey {
-    size_t best;   /* the row outside A whose entry gains most then, or N */
-    bool   turned; /* a nu would change its sign on the way */
-} survey_t;
-
 /* z = l - t T_i, T_i in self->step; with share = 1 / T_ii the gains are those after row i has entered,
- * with 0 those of T as it is. */
-static survey_t advance(const blw_l1_t *self, blw_real_t t, blw_real_t share)
+ * with 0 those of T as it is.  *seen: what comes next. */
+static void advance(const blw_l1_t *self, blw_real_t t, blw_real_t share, blw_l1_survey_t *seen)
 {
-    const size_t            N     = self->model->N;
-    const blw_real_t *const col   = self->step;
-    const blw_real_t *const limit = self->tau;
-    const blw_real_t       *T_jj  = self->L;
-    survey_t                seen  = {N, false};
-    blw_real_t              most  = BLW_R(0.0); /* the largest gain, as a fraction */
-    blw_real_t              over  = BLW_R(1.0);
+    if (self->model->fast != NULL) {
+        self->model->fast->advance(self, t, share, seen);
+        return;
+    }
+    const size_t            N    = self->model->N;
+    const blw_real_t *const col  = self->step;
+    const blw_real_t       *T_jj = self->L;
 
+    *seen = (blw_l1_survey_t){N, BLW_R(0.0), BLW_R(1.0), false};
     for (size_t j = 0U; j < N; j++) {
-        const blw_real_t v      = self->l[j] - (t * col[j]);
-        const blw_real_t excess = blw_la_abs(v) - limit[j];
-        self->z[j]              = v;
-        if (excess > BLW_R(0.0)) {
-            if (limit[j] < BLW_R(0.0)) {
-                seen.turned = seen.turned || ((v * self->dir[j]) < BLW_R(0.0));
-            } else {
-                const blw_real_t left = *T_jj - (col[j] * col[j] * share);
-                const blw_real_t gain = excess * excess;
-                if ((gain * over) > (most * blw_la_max(left, PIVOT_MIN))) {
-                    most      = gain;
-                    over      = blw_la_max(left, PIVOT_MIN);
-                    seen.best = j;
-                }
-            }
-        }
+        self->z[j] = self->l[j] - (t * col[j]);
+        blw_l1_look(seen, j, self->z[j], self->tau[j], &self->dir[j], T_jj, &col[j], share);
         T_jj += j + 2U;
     }
-    return seen;
 }
 
 /* Row i enters A with sign s, or leaves it with s = 0. */
@@ -207,42 +189,42 @@ static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
     return sweeps;
 }
 
-/* Row i enters at once.  @return what comes next; turned, and nothing changed, if it cannot. */
-static survey_t enter(blw_l1_t *self, size_t i, blw_real_t s)
+/* Row i enters at once, *seen: what comes next.  @return whether it can; if not, nothing changed. */
+static bool enter(blw_l1_t *self, size_t i, blw_real_t s, blw_l1_survey_t *seen)
 {
-    survey_t seen = {i, true};
-
     column(self, i, self->step);
-    if (self->step[i] > PIVOT_MIN) {
-        const blw_real_t share = BLW_R(1.0) / self->step[i];
-        const blw_real_t t     = (self->l[i] - (s * self->model->c[i])) * share;
-        assign(self, i, s);
-        seen = advance(self, t, share);
-        if (seen.turned) {
-            assign(self, i, BLW_R(0.0));
-        } else {
-            take_step(self);
-            self->l[i] = t;
-            sweep(self, i, self->step);
-        }
+    if (self->step[i] <= BLW_L1_PIVOT_MIN) {
+        return false;
     }
-    return seen;
+    const blw_real_t share = BLW_R(1.0) / self->step[i];
+    const blw_real_t t     = (self->l[i] - (s * self->model->c[i])) * share;
+
+    assign(self, i, s);
+    advance(self, t, share, seen);
+    if (seen->turned) {
+        assign(self, i, BLW_R(0.0));
+        return false;
+    }
+    take_step(self);
+    self->l[i] = t;
+    sweep(self, i, self->step);
+    return true;
 }
 
 /* Sweeps until no row violates |l_i| <= c_i, as far as T can tell. */
 static void pivot(blw_l1_t *self, blw_l1_info_t *info)
 {
-    const blw_l1_model_t *const m    = self->model;
-    survey_t                    seen = advance(self, BLW_R(0.0), BLW_R(0.0));
+    const blw_l1_model_t *const m = self->model;
+    blw_l1_survey_t             seen;
 
+    advance(self, BLW_R(0.0), BLW_R(0.0), &seen);
     while ((seen.best < m->N) && (info->iterations < m->max_iterations)) {
         const size_t     i      = seen.best;
         const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
         unsigned         sweeps = 1U;
-        seen                    = enter(self, i, s);
-        if (seen.turned) {
-            sweeps    = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations);
-            seen      = advance(self, BLW_R(0.0), BLW_R(0.0));
+        if (!enter(self, i, s, &seen)) {
+            sweeps = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations);
+            advance(self, BLW_R(0.0), BLW_R(0.0), &seen);
             seen.best = (sweeps > 0U) ? seen.best : m->N;
         }
         info->iterations = (uint16_t)(info->iterations + sweeps);
@@ -262,7 +244,7 @@ static void rebuild(blw_l1_t *self)
     for (size_t i = 0U; i < m->N; i++) {
         if (blw_l1_clipped(self, i)) {
             column(self, i, self->step);
-            if (self->step[i] > PIVOT_MIN) {
+            if (self->step[i] > BLW_L1_PIVOT_MIN) {
                 sweep(self, i, self->step);
             } else {
                 self->l[i] = self->model->c[i] * self->dir[i];

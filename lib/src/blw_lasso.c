@@ -125,6 +125,9 @@ static BLW_APART blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used
     const size_t                    r      = jordan->r;
     blw_mask_t                      taken  = used;
 
+    if ((self->model->P == NULL) && blw_la_bounded(self->model->l1->N, self->zeta)) {
+        return used;
+    }
     for (size_t i = 0U; i < jordan->m; i++) {
         if (!transform_sensor(self, i)) {
             blw_la_fill(r, BLW_R(0.0), &self->zeta[i * r]);

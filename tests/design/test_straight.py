@@ -74,7 +74,7 @@ PARTS = {
     "kalman": "bare = blw_NAME_kalman; bare.step = NULL;",
     "lasso": """static blw_jordan_model_t filters; static blw_l1_model_t fusion;
     bare = blw_NAME_lasso; filters = *bare.jordan; filters.step = NULL; bare.jordan = &filters;
-    fusion = *bare.l1; fusion.symv = NULL; fusion.reduce = NULL; bare.l1 = &fusion;""",
+    fusion = *bare.l1; fusion.fast = NULL; bare.l1 = &fusion;""",
     "guard": """bare = blw_NAME_guard; bare.advance = NULL; bare.multiply = NULL; bare.move = NULL;
     bare.squares = NULL; bare.average = NULL; bare.fuse = NULL;""",
 }

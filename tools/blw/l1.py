@@ -263,8 +263,7 @@ def struct(
             "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if tableau else None,
             "P": table(pack_lower(scaled_F @ reduced_form.W @ scaled_F.T), "[n(n+1)/2] F W F'")
             if tableau else None,
-            "symv": l1_straight.symv(N) if tableau else None,
-            "reduce": l1_straight.reduce(N) if tableau else None,
+            "fast": l1_straight.kernels(f"{suffix}_fast", N, F.shape[0]) if tableau else None,
             "rho": real(engine.rho),
             "kappa_G": real(kappa_G),
             "kappa_W": real(kappa_W),

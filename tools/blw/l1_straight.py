@@ -5,54 +5,142 @@ blw_l1_tableau.c, whose order of summation every function here follows (see stra
 The matrices are arguments, packed by rows: one function serves S, W and the tableau.
 """
 
+from collections.abc import Iterable
+
 from blw.straight import loads, names, statement
-from blw.tables import Code
+from blw.tables import Code, Struct
 
 #: Rows that the loops take at a time.
 STRIP = 3
 
-#: Most rows of zeta: 36 bytes of flash for each number of a packed matrix.
+#: Most rows of zeta: beyond, the loops cost little more and far less flash.
 MOST_ROWS = 16
 
+PASS_ON = "/* fall through */"
 
-def symv(N: int) -> Code | None:
-    """blw_l1_symv_kernel_t, or None where the loops serve better."""
+
+def kernels(suffix: str, N: int, n: int) -> Struct | None:
+    """blw_l1_kernels_t, or None where the loops serve better."""
     if N > MOST_ROWS:
         return None
-    x, lines = names("x", N), loads("x", names("x", N))
-    for first in range(0, N, STRIP):
-        rows = range(first, first + STRIP) if first + STRIP <= N else range(first, N)
-        for strip in [rows] if len(rows) == STRIP else [range(i, i + 1) for i in rows]:
-            for i in strip:
-                terms = [product(i, j, x) for j in range(strip.stop)]
-                lines += statement(f"blw_real_t y{i} =", " + ".join(terms) + ";")
-            for j in range(strip.start):
-                terms = [product(i, j, x, i) for i in strip]
-                lines += statement(f"y{j} =", " + ".join([f"y{j}", *terms]) + ";")
+    members = {"symv": symv(N), "column": column(N), "sweep": sweep(N), "advance": advance(N),
+               "fuse": fuse(n, N), "spread": spread(n, N), "predict": predict(n, N),
+               "balance": balance(n, N)}
+    return Struct("blw_l1_kernels_t", suffix, members)
+
+
+def symv(N: int) -> Code:
+    """blw_l1_symv_kernel_t."""
+    x = names("x", N)
+    lines = loads("x", x)
+    whole = N - N % STRIP
+    strips = [range(i, i + STRIP) for i in range(0, whole, STRIP)]
+    for strip in [*strips, *(range(i, i + 1) for i in range(whole, N))]:
+        for i in strip:
+            terms = [f"(S[{at(i, j)}] * {x[j]})" for j in range(strip.stop)]
+            lines += statement(f"blw_real_t y{i} =", " + ".join(terms) + ";")
+        for j in range(strip.start):
+            terms = [f"(S[{at(i, j)}] * {x[i]})" for i in strip]
+            lines += statement(f"y{j} =", " + ".join([f"y{j}", *terms]) + ";")
     lines += [f"y[{i}] = y{i};" for i in range(N)]
     return Code("void", "const blw_real_t *S, const blw_real_t *x, blw_real_t *y", tuple(lines),
                 f"y = S x: {N * N} multiply-adds")
 
 
-def product(i: int, j: int, x: list[str], of: int | None = None) -> str:
-    """"(S_ij * x_j)", or times x_of."""
-    return f"(S[{at(i, j)}] * {x[j if of is None else of]})"
+def column(N: int) -> Code:
+    """blw_l1_column_kernel_t."""
+    upper = [f"col[{j}] = row[{j}];" for j in range(N)]
+    lower = [f"col[{j}] = below[{at(j, 0)}];" for j in range(1, N)]
+    lines = ["const blw_real_t *const row = &T[(k * (k + 1U)) / 2U];",
+             "const blw_real_t *const below = &T[k];", "",
+             *descend(upper), *ascend(lower)]
+    return Code("void", "size_t k, const blw_real_t *T, blw_real_t *col", tuple(lines),
+                "column k of T")
+
+
+def sweep(N: int) -> Code:
+    """blw_l1_sweep_kernel_t."""
+    x = names("x", N)
+    lines = ["const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;",
+             "blw_real_t *const row = &T[(k * (k + 1U)) / 2U];",
+             "blw_real_t *const below = &T[k];", *loads("col", x), ""]
+    for i in range(N):
+        lines.append(f"const blw_real_t a{i} = {x[i]} * share;")
+        lines += [f"T[{at(i, j)}] -= a{i} * {x[j]};" for j in range(i + 1)]
+    upper = [f"row[{j}] = factor * {x[j]};" for j in range(N)]
+    lower = [f"below[{at(j, 0)}] = factor * {x[j]};" for j in range(1, N)]
+    lines += ["", *descend(upper), "row[k] = -share;", *ascend(lower)]
+    return Code("void", "size_t k, blw_real_t share, const blw_real_t *col, blw_real_t *T",
+                tuple(lines), f"T swept on row k: {N * (N + 1) // 2} multiply-adds")
+
+
+def advance(N: int) -> Code:
+    """blw_l1_advance_kernel_t."""
+    lines = ["const blw_real_t *const l = self->l;", "const blw_real_t *const limit = self->tau;",
+             "const blw_real_t *const dir = self->dir;",
+             "const blw_real_t *const col = self->step;", "const blw_real_t *const T = self->L;",
+             "blw_real_t *const z = self->z;",
+             f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0), false}};", ""]
+    for j in range(N):
+        lines += [f"const blw_real_t v{j} = l[{j}] - (t * col[{j}]);", f"z[{j}] = v{j};",
+                  f"blw_l1_look(&found, {j}U, v{j}, limit[{j}], &dir[{j}], &T[{at(j, j)}], "
+                  f"&col[{j}], share);"]
+    return Code("void", "const struct blw_l1 *self, blw_real_t t, blw_real_t share,\n"
+                "    blw_l1_survey_t *seen", (*lines, "*seen = found;"), "z = l - t col, surveyed")
+
+
+def fuse(n: int, N: int) -> Code:
+    """F v."""
+    rows = [" + ".join(f"(M[{j * N + i}] * v{i})" for i in range(N)) for j in range(n)]
+    return product(N, [f"out[{j}] = {row};" for j, row in enumerate(rows)], "out = F v")
+
+
+def spread(n: int, N: int) -> Code:
+    """F' h."""
+    rows = [" + ".join(f"(M[{j * N + i}] * v{j})" for j in range(n)) for i in range(N)]
+    return product(n, [f"out[{i}] = {row};" for i, row in enumerate(rows)], "out = F' v")
+
+
+def predict(n: int, N: int) -> Code:
+    """+ G x."""
+    rows = [" + ".join(f"(M[{i * n + j}] * v{j})" for j in range(n)) for i in range(N)]
+    return product(n, [f"out[{i}] += {row};" for i, row in enumerate(rows)], "out += G v")
+
+
+def balance(n: int, N: int) -> Code:
+    """-G' l."""
+    rows = [" + ".join(f"(M[{i * n + j}] * v{i})" for i in range(N)) for j in range(n)]
+    return product(N, [f"out[{j}] = -({row});" for j, row in enumerate(rows)], "out = -G' v")
+
+
+def product(size: int, results: list[str], comment: str) -> Code:
+    """blw_l1_product_kernel_t of a vector of that size."""
+    lines = loads("v", names("v", size))
+    for left, right in (line.split("= ", 1) for line in results):
+        lines += statement(f"{left}=", right)
+    return Code("void", "const blw_real_t *M, const blw_real_t *v, blw_real_t *out", tuple(lines),
+                comment)
 
 
 def at(i: int, j: int) -> int:
-    """Where a packed lower triangle has S_ij."""
+    """Where a packed lower triangle has element i, j of a symmetric matrix."""
     row, column = max(i, j), min(i, j)
     return row * (row + 1) // 2 + column
 
 
-def reduce(N: int) -> Code | None:
-    """blw_l1_reduce_kernel_t, or None where the loops serve better."""
-    if N > MOST_ROWS:
-        return None
-    x = names("x", N)
-    lines = loads("col", x)
-    for i in range(N):
-        lines.append(f"const blw_real_t a{i} = {x[i]} * share;")
-        lines += [f"T[{at(i, j)}] -= a{i} * {x[j]};" for j in range(i + 1)]
-    return Code("void", "const blw_real_t *col, blw_real_t share, blw_real_t *T", tuple(lines),
-                f"T -= share col col': {N * (N + 1) // 2} multiply-adds")
+def descend(statements: list[str]) -> list[str]:
+    """statements[k] to statements[0]."""
+    return jump((f"case {k}U:", line) for k, line in reversed([*enumerate(statements)]))
+
+
+def ascend(statements: list[str]) -> list[str]:
+    """statements[k] to the last; none where k is their number."""
+    return jump((f"case {k}U:", line) for k, line in enumerate(statements))
+
+
+def jump(cases: Iterable[tuple[str, str]]) -> list[str]:
+    """A switch over k that runs through all cases after the one it enters."""
+    lines = ["switch (k) {"]
+    for label, line in cases:
+        lines += [label, f"    {line}", f"    {PASS_ON}"]
+    return [*lines, "default:", "    break;", "}"]

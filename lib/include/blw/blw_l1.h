@@ -22,6 +22,8 @@
 extern "C" {
 #endif
 
+struct blw_l1;
+
 /** A way to solve (2).  The model holds its address, so that a firmware links only the one it uses. */
 typedef struct blw_l1_ops blw_l1_ops_t;
 
@@ -32,35 +34,63 @@ extern const blw_l1_ops_t blw_l1_admm_ops;
 /** Groups of one row only: pivots on the tableau of S, verified in W. */
 extern const blw_l1_ops_t blw_l1_tableau_ops;
 
-/** y = S x for S [N x N] packed lower, as straight-line code that the design tool writes: the numbers of
- *  the loops; only the sign of a zero may differ, which no sum that starts from +0 lets through. */
+/** What a pass over the rows of the tableau found. */
+typedef struct blw_l1_survey {
+    size_t     best;   /**< the row whose entry gains most, or N */
+    blw_real_t gain;   /**< what it gains is gain / over */
+    blw_real_t over;   /**< > 0 */
+    bool       turned; /**< some nu would change its sign */
+} blw_l1_survey_t;
+
+/** y = S x for S [N x N] packed lower. */
 typedef void (*blw_l1_symv_kernel_t)(const blw_real_t *S, const blw_real_t *x, blw_real_t *y);
-/** T -= share col col' for T [N x N] packed lower, col [N]: the same bits as the loops. */
-typedef void (*blw_l1_reduce_kernel_t)(const blw_real_t *col, blw_real_t share, blw_real_t *T);
+/** Column k of the tableau T, [N]. */
+typedef void (*blw_l1_column_kernel_t)(size_t k, const blw_real_t *T, blw_real_t *col);
+/** T swept on row k; col = its column k, share = 1 / T_kk. */
+typedef void (*blw_l1_sweep_kernel_t)(size_t k, blw_real_t share, const blw_real_t *col,
+                                      blw_real_t *T);
+/** z = l - t col and what comes next (blw_l1_survey.h). */
+typedef void (*blw_l1_advance_kernel_t)(const struct blw_l1 *self, blw_real_t t, blw_real_t share,
+                                        blw_l1_survey_t *seen);
+
+/** A product with a matrix M, F [n x N] or G [N x n]. */
+typedef void (*blw_l1_product_kernel_t)(const blw_real_t *M, const blw_real_t *v, blw_real_t *out);
+
+/** Straight-line code for one N and n that the design tool writes: the numbers of the loops; only the sign of
+ *  a zero may differ, which no sum that starts from +0 lets through. */
+typedef struct blw_l1_kernels {
+    blw_l1_symv_kernel_t    symv;
+    blw_l1_column_kernel_t  column;
+    blw_l1_sweep_kernel_t   sweep;
+    blw_l1_advance_kernel_t advance;
+    blw_l1_product_kernel_t fuse;    /**< out = F v */
+    blw_l1_product_kernel_t spread;  /**< out = F' v */
+    blw_l1_product_kernel_t predict; /**< out += G v */
+    blw_l1_product_kernel_t balance; /**< out = -G' v */
+} blw_l1_kernels_t;
 
 typedef struct blw_l1_model {
-    uint16_t               N;              /**< rows of zeta */
-    uint16_t               d;              /**< columns of Z, N - n */
-    uint16_t               n_groups;       /**< groups */
-    uint16_t               max_iterations; /**< bound on pivots or passes in one solve */
-    uint8_t                n;              /**< states */
-    const blw_l1_ops_t    *engine;         /**< one of the above */
-    const uint16_t        *first;          /**< [n_groups + 1] first row of each group, then N */
-    const blw_real_t      *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
-    const blw_real_t      *F;       /**< [n x N] */
-    const blw_real_t      *c;       /**< [n_groups] thresholds, > 0 */
-    const blw_real_t      *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
+    uint16_t                N;              /**< rows of zeta */
+    uint16_t                d;              /**< columns of Z, N - n */
+    uint16_t                n_groups;       /**< groups */
+    uint16_t                max_iterations; /**< bound on pivots or passes in one solve */
+    uint8_t                 n;              /**< states */
+    const blw_l1_ops_t     *engine;         /**< one of the above */
+    const uint16_t         *first;          /**< [n_groups + 1] first row of each group, then N */
+    const blw_real_t       *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
+    const blw_real_t       *F;       /**< [n x N] */
+    const blw_real_t       *c;       /**< [n_groups] thresholds, > 0 */
+    const blw_real_t       *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
                                            NULL otherwise */
-    const blw_real_t      *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
-    const blw_real_t      *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
-    const blw_real_t      *G;       /**< tableau: [N x n], or NULL */
-    const blw_real_t      *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
-    blw_l1_symv_kernel_t   symv;    /**< straight-line code for the tableau; may be NULL */
-    blw_l1_reduce_kernel_t reduce;  /**< the same */
-    blw_real_t             rho;     /**< ADMM: penalty, > 0; 0 otherwise */
-    blw_real_t             kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
+    const blw_real_t       *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
+    const blw_real_t       *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
+    const blw_real_t       *G;       /**< tableau: [N x n], or NULL */
+    const blw_real_t       *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
+    const blw_l1_kernels_t *fast;    /**< all of its members for the tableau, or NULL */
+    blw_real_t              rho;     /**< ADMM: penalty, > 0; 0 otherwise */
+    blw_real_t              kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
                                            least |x| / kappa_G */
-    blw_real_t             kappa_W; /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
+    blw_real_t              kappa_W; /**< and sum_g c_g |(W Z e)_g| is at most kappa_W |e| */
 } blw_l1_model_t;
 
 /** Solver state: the support A found last, from which the next solve starts. */

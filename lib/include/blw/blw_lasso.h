@@ -19,6 +19,7 @@
 #include "blw/blw_estimator.h"
 #include "blw/blw_jordan.h"
 #include "blw/blw_l1.h"
+#include "blw/blw_l1_survey.h"
 #ifdef __cplusplus
 extern "C" {
 #endif
