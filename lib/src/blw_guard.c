@@ -32,7 +32,7 @@ static void bind(blw_guard_t *self, const blw_guard_model_t *model, blw_real_t *
     self->x_hat     = blw_la_take(&mem, n);
     self->d         = blw_la_take(&mem, n);
     self->step      = blw_la_take(&mem, (size_t)model->most * model->r);
-    self->turned    = blw_la_take(&mem, 3U * (size_t)model->r);
+    self->turned    = blw_la_take(&mem, 4U * (size_t)model->r);
     self->L         = mem;
     self->all       = BLW_MASK_ALL(m);
 }
@@ -74,13 +74,18 @@ BLW_COLD blw_status_t blw_guard_reset(blw_guard_t *self, const blw_real_t *x0)
 }
 
 /* l = S e, h_i = |l_i| and the largest square; a NaN or an infinity in l makes that infinite or
- * NaN. */
+ * NaN.  After a gross attack l = S tau instead, for the solver. */
 static blw_real_t test(blw_guard_t *self)
 {
-    const size_t m       = self->model->head.plant->m;
-    blw_real_t   largest = BLW_R(0.0);
-    blw_real_t   all     = BLW_R(0.0);
+    const size_t     m       = self->model->head.plant->m;
+    const blw_mask_t gross   = blw_guard_gross(self);
+    blw_real_t       largest = BLW_R(0.0);
+    blw_real_t       all     = BLW_R(0.0);
 
+    if (gross != 0U) {
+        return blw_guard_test_without(self, gross);
+    }
+    self->attacked = 0U;
     blw_guard_multipliers(self->model, self->e, self->l);
     blw_guard_squares(self->model, self->l, self->h);
     for (size_t i = 0U; i < m; i++) {
@@ -234,7 +239,6 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
     bool                           converged = true;
     blw_real_t                     largest   = test(self);
 
-    self->attacked = 0U;
     self->excluded = 0U;
     self->updates  = 0U;
     if (!(largest <= (BLW_SIGNAL_MAX * BLW_SIGNAL_MAX))) {
@@ -244,7 +248,7 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
     out->statistic = blw_la_sqrt(largest);
     out->bound     = BLW_R(0.0);
     out->outcome   = (uint8_t)BLW_OUTCOME_KALMAN;
-    if (largest <= (model->k * model->k)) {
+    if ((largest <= (model->k * model->k)) && (self->attacked == 0U)) {
         fuse(self, self->e);
         return;
     }

@@ -82,7 +82,6 @@ void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const 
 {
     const size_t r = model->r;
 
-    blw_la_fill(r, BLW_R(0.0), y);
     if (j < i) {
         guard_mul(r, i * r, j * r, r, rows_of(model, i), x, y);
     } else {

@@ -17,20 +17,20 @@
 /* Steps of Newton's method at most; what they leave is left to the next update of the sensor. */
 #define MOST_STEPS 5U
 
-/* nu [r] of (10) from g [r] and s [r]; gamma = |g| > k. */
-static void solve_secular(size_t r, blw_real_t k, blw_real_t gamma, const blw_real_t *s,
-                          const blw_real_t *g, blw_real_t *nu)
+/* mu of (10) from g [r] and s [r]; gamma = |g| > k. */
+static blw_real_t solve_secular(size_t r, blw_real_t k, blw_real_t gamma, const blw_real_t *s,
+                                const blw_real_t *g)
 {
     blw_real_t mu = k / (gamma - k);
 
     for (size_t step = 0U; step < MOST_STEPS; step++) {
-        blw_real_t total = BLW_R(0.0);
+        blw_real_t total = BLW_R(0.0); /* |nu|^2 */
         blw_real_t bent  = BLW_R(0.0); /* nu' (diag(s) + mu I)^-1 nu */
 
         for (size_t c = 0U; c < r; c++) {
             const blw_real_t inverse = BLW_R(1.0) / (s[c] + mu);
-            nu[c]                    = g[c] * inverse;
-            const blw_real_t square  = nu[c] * nu[c];
+            const blw_real_t nu      = g[c] * inverse;
+            const blw_real_t square  = nu * nu;
             total += square;
             bent += square * inverse;
         }
@@ -38,64 +38,71 @@ static void solve_secular(size_t r, blw_real_t k, blw_real_t gamma, const blw_re
         const blw_real_t slope  = (length / k) - (bent / total);
         const blw_real_t miss   = BLW_R(1.0) - ((mu / k) * length);
         if (!(blw_la_abs(miss) > CLOSE) || !(slope > BLW_R(0.0))) {
-            return;
+            break;
         }
         mu += miss / slope;
     }
+    return mu;
 }
 
-/* V nu_i and g of (10). */
-static void turn(blw_guard_t *self, size_t i, const blw_real_t *V, const blw_real_t *s,
-                 blw_real_t *before, blw_real_t *g)
+/* V and s of S_ii without sensor j. */
+static const blw_real_t *spectrum(const blw_guard_model_t *model, size_t i, size_t j,
+                                  const blw_real_t **s)
 {
-    const size_t r = self->model->r;
+    const size_t r  = model->r;
+    const size_t at = (i * ((size_t)model->head.plant->m - 1U)) + ((j < i) ? j : (j - 1U));
 
-    blw_la_fill(r, BLW_R(0.0), before);
-    blw_la_fill(r, BLW_R(0.0), g);
-    guard_mul(r, r, 0U, r, V, &self->l[i * r], g);
-    if (!guard_has(self->attacked, i)) {
-        return;
-    }
+    *s = &model->s[at * r];
+    return &model->V[at * r * r];
+}
+
+bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real_t *l,
+                           const blw_real_t *tau, blw_real_t *step)
+{
+    const size_t            r      = self->model->r;
+    const blw_real_t        k      = self->model->k;
+    const blw_real_t       *s      = NULL;
+    const blw_real_t *const V      = spectrum(self->model, i, j, &s);
+    const blw_real_t *const e      = &self->e[i * r];
+    blw_real_t *const       before = &self->turned[r];      /* V nu_i */
+    blw_real_t *const       turned = &self->turned[2U * r]; /* V l_i */
+    blw_real_t *const       g      = &self->turned[3U * r];
+    blw_real_t              square = BLW_R(0.0);
+
     for (size_t a = 0U; a < r; a++) {
-        self->step[a] = self->e[(i * r) + a] - self->eta[(i * r) + a];
+        step[a]   = e[a] - tau[a];
+        before[a] = BLW_R(0.0);
+        turned[a] = BLW_R(0.0);
     }
-    guard_mul(r, r, 0U, r, V, self->step, before);
+    guard_mul(r, r, 0U, r, V, l, turned);
+    guard_mul(r, r, 0U, r, V, step, before);
     for (size_t c = 0U; c < r; c++) {
-        g[c] += s[c] * before[c];
+        g[c] = turned[c] + (s[c] * before[c]);
+        square += g[c] * g[c];
     }
+    const blw_real_t gamma    = blw_la_sqrt(square);
+    const bool       attacked = gamma > k;
+    const blw_real_t mu       = attacked ? solve_secular(r, k, gamma, s, g) : BLW_R(0.0);
+    for (size_t c = 0U; c < r; c++) { /* the change of nu, exact for large nu too, less its sign */
+        before[c] = attacked ? (((mu * before[c]) - turned[c]) / (s[c] + mu)) : before[c];
+        step[c]   = BLW_R(0.0);
+    }
+    guard_mul_t(r, r, 0U, r, V, before, step, step);
+    return attacked;
 }
 
-void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j)
+void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
+                      blw_real_t *turned, blw_real_t *y)
 {
-    const blw_guard_model_t *const model = self->model;
-    const size_t                   r     = model->r;
-    const size_t      at     = (i * ((size_t)model->head.plant->m - 1U)) + ((j < i) ? j : (j - 1U));
-    const blw_real_t *V      = &model->V[at * r * r];
-    const blw_real_t *s      = &model->s[at * r];
-    blw_real_t *const before = self->turned;
-    blw_real_t *const g      = &self->turned[r];
-    blw_real_t *const after  = &self->turned[2U * r];
+    const size_t            r = model->r;
+    const blw_real_t       *s = NULL;
+    const blw_real_t *const V = spectrum(model, i, j, &s);
 
-    turn(self, i, V, s, before, g);
-    blw_la_fill(r, BLW_R(0.0), after);
-    const blw_real_t gamma = blw_la_norm(r, g);
-    self->attacked &= ~guard_bit(i);
-    if (gamma > model->k) {
-        solve_secular(r, model->k, gamma, s, g, after);
-        self->attacked |= guard_bit(i);
-    }
-    for (size_t c = 0U; c < r; c++) { /* tau = e - nu */
-        before[c] -= after[c];
-    }
-    blw_la_fill(r, BLW_R(0.0), self->step);
-    guard_mul_t(r, r, 0U, r, V, before, self->step, self->step);
-    blw_guard_couple(model, j, i, self->step, g);
+    blw_la_fill(r, BLW_R(0.0), turned);
+    blw_la_fill(r, BLW_R(0.0), y);
+    guard_mul(r, r, 0U, r, V, x, turned);
     for (size_t c = 0U; c < r; c++) {
-        g[c] = -g[c];
+        turned[c] = (s[c] > GUARD_PIVOT_MIN) ? (turned[c] / s[c]) : BLW_R(0.0);
     }
-    blw_guard_move(self, i, self->step);
-    blw_guard_move(self, j, g);
-    if (!guard_has(self->attacked, i)) {
-        blw_la_copy(r, &self->e[i * r], &self->eta[i * r]);
-    }
+    guard_mul_t(r, r, 0U, r, V, turned, y, y);
 }

@@ -5,13 +5,39 @@
 #define BLW_GUARD_INTERNAL_H
 #include "blw/blw_guard.h"
 
+/** Sensors that move together at most. */
+#define GUARD_SOME 4U
+
+/** A pivot of S_II (whose diagonal is 1) below this belongs to a direction that the sensors outside
+ *  I check a hundred times worse than all sensors do together, and in which float has few digits
+ *  left. */
+#define GUARD_PIVOT_MIN BLW_R(1e-4)
+
+/** |e_i| / k above which rounding in l would show. */
+#define GUARD_GROSS BLW_R(64.0)
+
+/** A sensor among some that move together. */
+typedef struct blw_guard_local {
+    size_t      sensor;
+    blw_real_t  k;        /* of (2), 0 if it is excluded */
+    blw_real_t *l;        /* [r] */
+    blw_real_t *tau;      /* [r] */
+    bool        attacked; /* nu_i /= 0 */
+} blw_guard_local_t;
+
+typedef struct blw_guard_some {
+    size_t            count;
+    size_t            penalised; /* the first ones; the others are excluded */
+    blw_guard_local_t at[GUARD_SOME];
+} blw_guard_some_t;
+
 /** l = S tau, every row. */
 void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau, blw_real_t *l);
 /** squares [m] = |l_i|^2 */
 void blw_guard_squares(const blw_guard_model_t *model, const blw_real_t *l, blw_real_t *squares);
 /** Add `step` [r] to tau_i, and S_ji step to l_j for all sensors j. */
 void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step);
-/** y = S_ij x, i /= j */
+/** y += S_ij x, i /= j */
 void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
                       blw_real_t *y);
 /** Copy row a of S_ij, i > j, to row [r]. */
@@ -22,16 +48,29 @@ void blw_guard_advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used);
 /** Check every table and dimension. */
 blw_status_t blw_guard_check(const blw_guard_model_t *model);
 
-/** Solve (2) from e [N] and l = S e; tau is left in self->eta.  Fills h, attacked, excluded.
+/** The sensors whose filters a gross attack has reached; none if they are so many that it may be the
+ *  reference that is off.  Overwrites suspicion. */
+blw_mask_t blw_guard_gross(blw_guard_t *self);
+/** tau = e, but 0 for the sensors of a set, l = S tau, and nu_i /= 0 for that set. */
+void blw_guard_start_without(blw_guard_t *self, blw_mask_t set);
+/** blw_guard_start_without() and all |h_i| there.  @return the largest of the |l_i|^2 there and, for the
+ *  sensors of the set, at nu = 0. */
+blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set);
+/** h_i = l_i + nu_i [r] of sensor i.  @return |h_i| */
+blw_real_t blw_guard_pull(const blw_guard_t *self, size_t i, blw_real_t *h);
+
+/** Solve (2) from e [N] and l = S e, or from tau and l as blw_guard_start_without() leaves them, and
+ *  the |h_i| there; tau is left in self->eta.  Fills h, attacked, excluded.
  *  @return the bound on |x_hat - that of the minimiser|. */
 blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged);
 /** (9) of blw_guard_bound.c from e, tau and l with l' S^+ l = l' tau; BLW_REAL_MAX if the model has no
  *  kappa.  Overwrites suspicion. */
 blw_real_t blw_guard_bound(blw_guard_t *self);
-/** The largest |h_i| of the sensors outside a set, 0 if there is none; and whose it is. */
-blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *sensor);
-/** The p units with the largest |h_i| above the threshold, as sensors; *clear: changes of |h_i| by
- *  `margin` would not change the choice. */
+/** Whether changes of |h_i| by `margin` would leave the sensors of a set above all others, and above
+ *  the threshold. */
+bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin);
+/** The p units with the largest |h_i| above the threshold, as sensors; *clear: these are p, and
+ *  stand out by `margin`. */
 blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear);
 /** The sets of p units: the one whose removal explains most of l = S e, as a mask of sensors; or a
  *  set that is `known` to explain all that clips, unless another explains k^2 / 4 more. */
@@ -48,8 +87,28 @@ void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x);
 /** One Newton step of (2) on the sensors of the set, at most model->most.  @return false with nothing
  *  changed if an attack would change sides, where the model of second order is of no use. */
 bool blw_guard_newton(blw_guard_t *self, blw_mask_t set);
-/** The minimum of (2) over nu_i and nu_j, where j is the one excluded sensor and l_j = 0. */
-void blw_guard_update_beside(blw_guard_t *self, size_t i, size_t j);
+/** List a set of sensors, the excluded ones last.  @return false if they are too many. */
+bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some);
+/** Minimise (2) over the nu of the sensors in the list.  That counts as one update each for the sums of
+ *  their steps, and one for each step but that of a sensor alone.  @return false with nothing
+ *  changed if the list is empty or that is more than the limit allows. */
+bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
+                         unsigned limit);
+/** The sensors without nu_i that clip; suspicion is filled with all |l_i|^2. */
+blw_mask_t blw_guard_clipping(blw_guard_t *self);
+/** The step [r] of tau_i from l_i and tau_i to the minimum of (2) over nu_i and nu_j, where j is the one
+ *  excluded sensor and l_j = 0.  @return whether nu_i /= 0 then. */
+bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real_t *l,
+                           const blw_real_t *tau, blw_real_t *step);
+/** y = (S_ii - S_ij S_ji)^-1 x, 0 where nothing but i and j can check; turned [r] is overwritten. */
+void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
+                      blw_real_t *turned, blw_real_t *y);
+
+/** Whether blw_guard_relax() eliminates so many excluded sensors exactly. */
+static inline bool blw_guard_exact(const blw_guard_t *self, size_t excluded)
+{
+    return (excluded <= 1U) || ((excluded == 2U) && (self->model->pairs != 0U));
+}
 
 /** Numbers of Lam_i: r^2 without the triangle below `reach` diagonals. */
 static inline size_t blw_guard_filter_len(const blw_guard_model_t *model)

@@ -5,11 +5,6 @@
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
-/* A pivot of S_II (whose diagonal is 1) below this belongs to a direction that the sensors outside
- * I check a hundred times worse than all sensors do together, and in which float has few digits
- * left. */
-#define PIVOT_MIN BLW_R(1e-4)
-
 /* A Newton step may shorten an attack to this part of its length, not further. */
 #define SHORTEST BLW_R(0.05)
 
@@ -52,7 +47,7 @@ void blw_guard_factor(const blw_guard_t *self, size_t rows)
             Li[j] = (Lj[j] > BLW_R(0.0)) ? ((Li[j] - blw_la_dot(j, Li, Lj)) / Lj[j]) : BLW_R(0.0);
         }
         const blw_real_t pivot = Li[i] - blw_la_dot(i, Li, Li);
-        Li[i]                  = (pivot > PIVOT_MIN) ? blw_la_sqrt(pivot) : BLW_R(0.0);
+        Li[i]                  = (pivot > GUARD_PIVOT_MIN) ? blw_la_sqrt(pivot) : BLW_R(0.0);
     }
 }
 
@@ -178,16 +173,18 @@ bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
     return true;
 }
 
-blw_real_t blw_guard_largest(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
+/* The largest |h_i| of the sensors outside a set, 0 if there is none; and whose it is. */
+static blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
 {
     const size_t m       = self->model->head.plant->m;
     blw_real_t   largest = BLW_R(0.0);
 
     for (size_t i = 0U; i < m; i++) {
-        if ((self->h[i] > largest) && !guard_has(set, i)) {
+        if (((set & 1U) == 0U) && (self->h[i] > largest)) {
             largest = self->h[i];
             *sensor = i;
         }
+        set >>= 1;
     }
     return largest;
 }
@@ -204,26 +201,41 @@ static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
     return set;
 }
 
+bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin)
+{
+    blw_real_t least = BLW_REAL_MAX;         /* inside */
+    blw_real_t most  = self->model->exclude; /* outside */
+
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        const blw_real_t h = self->h[i];
+
+        if ((set & 1U) == 0U) {
+            most = blw_la_max(most, h);
+        } else if (h < least) {
+            least = h;
+        } else {
+            /* another one is nearer */
+        }
+        set >>= 1;
+    }
+    return (least - most) > margin;
+}
+
 blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear)
 {
     const blw_guard_model_t *const model  = self->model;
     const size_t                   p      = model->head.plant->p;
     blw_mask_t                     chosen = 0U;
     size_t                         sensor = 0U;
-    blw_real_t                     last   = BLW_REAL_MAX;
 
     for (size_t taken = 0U; taken < p; taken++) {
-        const blw_real_t largest = blw_guard_largest(self, chosen, &sensor);
-
-        if (!(largest > model->exclude)) {
+        if (!(largest_outside(self, chosen, &sensor) > model->exclude)) {
             *clear = false;
             return chosen;
         }
-        last = largest;
         chosen |= unit_of(model, sensor);
     }
-    *clear = (last > (model->exclude + margin))
-             && ((last - blw_guard_largest(self, chosen, &sensor)) > margin);
+    *clear = blw_guard_stands_out(self, chosen, margin);
     return chosen;
 }
 

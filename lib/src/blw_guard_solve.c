@@ -5,26 +5,31 @@
  * moves tau_i, and l_i, by
  *     step = s h_i - l_i.                                                                    (7)
  * tau is kept rather than nu: it stays at noise size however large the attack, and a sensor that
- * leaves the support gets tau_i = e_i exactly.  What a gross attack has left in l by rounding is
- * removed by computing l = S tau again once nothing moves any more. */
+ * leaves the support gets tau_i = e_i exactly.  Where tau_i starts makes no difference to the minimum:
+ * after a gross attack it starts from 0, and l = S tau holds no rounding of what was sent. */
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
 /* Largest |step| that ends the descent, relative to k: eps^(2/3), about. */
 #define TOLERANCE ((BLW_REAL_EPS > BLW_R(1e-10)) ? BLW_R(3e-5) : BLW_R(3e-11))
 
-/* |step| / k above which rounding in l would show. */
-#define GROSS BLW_R(64.0)
+/* While it is only to be decided which units to exclude, the steps of the sensors that move together
+ * end at this part of the largest one. */
+#define COARSE BLW_R(0.01)
 
-/* Sensors may come up for another update so many times before Newton steps are tried. */
-#define PATIENCE 2U
+/* Sensors may come up again so many times before Newton steps are tried, in sweeps over several at a
+ * time. */
+#define PATIENCE 1U
+
+/* Updates that looking at all sensors counts as, wherever that leads. */
+#define LOOK 2U
 
 /* The units to exclude are beyond doubt if no |h_i| is nearer to where it would matter than this
  * many times the largest |step|. */
 #define CLEAR BLW_R(8.0)
 
-/* A sensor is excluded at once if its |h_i| is larger than all others and than the threshold by this
- * many times k. */
+/* Units are excluded at once if their |h_i| are larger than all others and than the threshold by
+ * this many times k. */
 #define AT_ONCE BLW_R(4.0)
 
 typedef struct descent {
@@ -39,27 +44,18 @@ typedef struct descent {
     blw_mask_t chosen;  /* what `decides` has ended with, or 0 */
 } descent_t;
 
-/* s of (7) from |h_i|. */
-static blw_real_t shrink(blw_real_t h, blw_real_t k)
+/* |step| of (7) for a sensor with nu_i /= 0 from its h_i and |h_i|. */
+static blw_real_t attacked_step(const blw_guard_t *self, size_t i, const blw_real_t *h,
+                                blw_real_t length)
 {
-    return (h > k) ? (k / h) : BLW_R(1.0);
-}
+    const size_t            r = self->model->r;
+    const blw_real_t *const l = &self->l[i * r];
+    const blw_real_t        s = (length > self->model->k) ? (self->model->k / length) : BLW_R(1.0);
+    blw_real_t              sum = BLW_R(0.0);
 
-/* |step| of (7) for a sensor with nu_i /= 0 from its l, e and tau [r]; also h_i and its length. */
-static blw_real_t attacked_step(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
-                                const blw_real_t *tau, blw_real_t *h, blw_real_t *length)
-{
-    blw_real_t sum = BLW_R(0.0);
-
-    for (size_t a = 0U; a < r; a++) {
-        h[a] = l[a] + (e[a] - tau[a]);
-        sum += h[a] * h[a];
-    }
-    *length            = blw_la_sqrt(sum);
-    const blw_real_t s = shrink(*length, k);
-    sum                = BLW_R(0.0);
     for (size_t a = 0U; a < r; a++) {
         const blw_real_t step = (s * h[a]) - l[a];
+
         sum += step * step;
     }
     return blw_la_sqrt(sum);
@@ -73,64 +69,49 @@ static void note_step(descent_t *descent, size_t i, blw_real_t length)
     }
 }
 
-/* All |h_i|, and the largest step.  What the first loop says of a sensor with nu_i /= 0 or k_i = 0 is
- * less than its step, which the second finds. */
-static void survey(blw_guard_t *self, descent_t *descent)
+/* The largest step where no sensor has nu_i, from all |h_i|. */
+static void note_clipping(const blw_guard_t *self, descent_t *descent)
 {
-    const blw_guard_model_t *const model    = self->model;
-    const size_t                   r        = model->r;
-    const size_t                   m        = model->head.plant->m;
-    const blw_real_t               k        = model->k;
-    blw_mask_t                     excluded = self->excluded;
-    size_t                         row      = 0U;
+    const blw_real_t k = self->model->k;
 
     descent->pending = BLW_R(0.0);
     descent->largest = BLW_R(0.0);
-    blw_guard_squares(model, self->l, self->h);
-    for (size_t i = 0U; i < m; i++) {
-        const blw_real_t h = blw_la_sqrt(self->h[i]);
-
-        self->h[i] = h;
-        if (h > k) {
-            descent->pending += model->effect[i] * (h - k);
-            note_step(descent, i, h - k);
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        if (self->h[i] > k) {
+            descent->pending += self->model->effect[i] * (self->h[i] - k);
+            note_step(descent, i, self->h[i] - k);
         }
-    }
-    for (blw_mask_t rest = self->attacked | excluded; rest != 0U; rest >>= 1) {
-        if ((rest & 1U) != 0U) {
-            const size_t     i      = row / r;
-            const blw_real_t limit  = ((excluded & 1U) != 0U) ? BLW_R(0.0) : k;
-            const blw_real_t length = attacked_step(r, limit, &self->l[row], &self->e[row],
-                                                    &self->eta[row], self->step, &self->h[i]);
-
-            descent->pending += model->effect[i] * length;
-            note_step(descent, i, length);
-        }
-        excluded >>= 1;
-        row += r;
     }
 }
 
-/* (7) for sensor i. */
-static void update_sensor(blw_guard_t *self, size_t i)
+/* All |h_i|, and the largest step.  The step of an excluded sensor is -l_i. */
+static void survey(blw_guard_t *self, descent_t *descent)
 {
-    const size_t            r   = self->model->r;
-    const blw_real_t        k   = guard_has(self->excluded, i) ? BLW_R(0.0) : self->model->k;
-    const blw_real_t        s   = shrink(self->h[i], k);
-    const blw_real_t *const e   = &self->e[i * r];
-    const blw_real_t *const l   = &self->l[i * r];
-    blw_real_t *const       tau = &self->eta[i * r];
+    const blw_real_t k        = self->model->k;
+    blw_real_t      *h        = self->h;
+    blw_mask_t       excluded = self->excluded;
+    blw_mask_t       support  = self->attacked | excluded;
 
-    for (size_t a = 0U; a < r; a++) {
-        self->step[a] = (s * (l[a] + (e[a] - tau[a]))) - l[a];
+    descent->pending = BLW_R(0.0);
+    descent->largest = BLW_R(0.0);
+    blw_guard_squares(self->model, self->l, h);
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        blw_real_t step = blw_la_sqrt(h[i]);
+
+        h[i] = step;
+        if ((support & 1U) != 0U) {
+            h[i] = blw_guard_pull(self, i, self->step);
+            step = ((excluded & 1U) != 0U) ? step : attacked_step(self, i, self->step, h[i]);
+        } else {
+            step -= k;
+        }
+        if (step > BLW_R(0.0)) {
+            descent->pending += self->model->effect[i] * step;
+            note_step(descent, i, step);
+        }
+        support >>= 1;
+        excluded >>= 1;
     }
-    blw_guard_move(self, i, self->step);
-    self->attacked |= guard_bit(i);
-    if (!(self->h[i] > k)) {
-        blw_la_copy(r, e, tau);
-        self->attacked &= ~guard_bit(i);
-    }
-    self->updates++;
 }
 
 /* Block updates that a joint step on some sensors counts as: its spreads, and its factorisation. */
@@ -141,7 +122,7 @@ static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 
     return (sensors <= 1U)
                ? 1U
-               : (sensors + 1U + ((sensors * sensors * sensors * self->model->r) / rate));
+               : ((2U * (sensors + 1U)) + ((sensors * sensors * sensors * self->model->r) / rate));
 }
 
 /* Try a Newton step on a set of sensors.  @return whether anything was done. */
@@ -157,46 +138,53 @@ static bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
     return true;
 }
 
-/* The one excluded sensor, if there are tables for it; else m. */
-static size_t excluded_one(const blw_guard_t *self)
+/* The sensors to move next: the support, the one with the largest step, and what clips beside them;
+ * fewer if these are too many. */
+static void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_some_t *some)
 {
-    const size_t m     = self->model->head.plant->m;
-    size_t       found = m;
+    const blw_mask_t next    = guard_bit(descent->sensor);
+    const blw_mask_t support = self->attacked | self->excluded;
 
-    for (size_t i = 0U; (self->model->pairs != 0U) && (i < m); i++) {
-        found = guard_has(self->excluded, i) ? i : found;
+    if (!blw_guard_list(self, support | next | ((support != 0U) ? blw_guard_clipping(self) : 0U),
+                        some)
+        && !blw_guard_list(self, support | next, some)
+        && !blw_guard_list(self, self->excluded | next, some)) {
+        (void)blw_guard_list(self, next, some);
     }
-    return found;
 }
 
 /* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
 static bool update(blw_guard_t *self, descent_t *descent)
 {
-    const size_t     i       = descent->sensor;
-    const size_t     j       = excluded_one(self);
+    const blw_real_t k       = self->model->k;
+    const blw_mask_t next    = guard_bit(descent->sensor);
     const blw_mask_t support = self->attacked | self->excluded;
-    const bool several = guard_has(self->excluded, i) && (blw_mask_count(self->excluded) > 1U);
-    const bool beside  = (j < self->model->head.plant->m) && (j != i);
+    const bool       several = !blw_guard_exact(self, blw_mask_count(self->excluded));
+    blw_real_t       close   = TOLERANCE * k;
+    blw_guard_some_t some;
 
-    if (guard_has(self->attacked, i)) {
-        descent->repeats++;
-    }
-    if (several || (descent->repeats > PATIENCE)) {
-        if (update_jointly(self, support, descent->limit)
-            || (several && update_jointly(self, self->excluded, descent->limit))) {
-            return true;
-        }
-    }
-    if ((self->updates + (beside ? 2U : 1U)) > descent->limit) {
+    if ((self->updates + LOOK + ((self->excluded != 0U) ? 4U : 1U)) > descent->limit) {
         return false;
     }
-    if (beside) {
-        blw_guard_update_beside(self, i, j);
-        self->updates = (uint16_t)(self->updates + 2U);
-    } else {
-        update_sensor(self, i);
+    if ((self->attacked & next) != 0U) {
+        descent->repeats++;
     }
-    return true;
+    if (((((self->excluded & next) != 0U) && several) || (descent->repeats > PATIENCE))
+        && (update_jointly(self, support, descent->limit)
+            || (several && update_jointly(self, self->excluded, descent->limit)))) {
+        return true;
+    }
+    if (descent->decides) {
+        close = blw_la_max(close, COARSE * descent->largest);
+    }
+    list_next(self, descent, &some);
+    bool moved = blw_guard_move_some(self, &some, close, descent->limit - LOOK);
+    if (!moved) {
+        (void)blw_guard_list(self, self->excluded | next, &some);
+        moved = blw_guard_move_some(self, &some, close, descent->limit - LOOK);
+    }
+    self->updates = (uint16_t)(self->updates + LOOK);
+    return moved;
 }
 
 /* Descend until nothing moves, the choice is clear, or the limit is reached.  @return whether
@@ -230,91 +218,117 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
         if (still || !update(self, descent)) {
             return still;
         }
-        descent->gross = descent->gross || (descent->largest > (GROSS * k));
+        descent->gross = descent->gross || (descent->largest > (GUARD_GROSS * k));
     }
 }
 
-/* l_I = 0 for the excluded sensors I. */
-static void eliminate(blw_guard_t *self)
+/* l_I = 0 for the excluded sensors I, together with what else has nu_i /= 0. */
+static void eliminate(blw_guard_t *self, unsigned limit)
 {
-    const size_t m = self->model->head.plant->m;
+    const blw_real_t close = TOLERANCE * self->model->k;
+    blw_guard_some_t some;
 
-    if (blw_mask_count(self->excluded) > 1U) {
+    if (!blw_guard_exact(self, blw_mask_count(self->excluded))) {
         (void)blw_guard_newton(self, self->excluded);
         self->updates = (uint16_t)(self->updates + cost_of(self, self->excluded));
         return;
     }
-    for (size_t i = 0U; i < m; i++) {
-        if (guard_has(self->excluded, i)) {
-            update_sensor(self, i);
-        }
+    if (!blw_guard_list(self, self->attacked | self->excluded, &some)
+        || !blw_guard_move_some(self, &some, close, limit)) {
+        (void)blw_guard_list(self, self->excluded, &some);
+        (void)blw_guard_move_some(self, &some, close, limit);
     }
 }
 
-/* Set k_I = 0 for a set of sensors I, and l_I to 0.  After a gross attack its rounding is removed from
- * l first: where tau_I starts makes no difference, so it starts from 0. */
-static void exclude(blw_guard_t *self, blw_mask_t set, descent_t *descent)
+/* Solve for what clips beside the excluded sensors, if these stand out; for the one that clips most
+ * if the limit allows no more. */
+static void move_clipping(blw_guard_t *self, unsigned limit)
 {
-    const blw_guard_model_t *const model = self->model;
-    const size_t                   r     = model->r;
+    const blw_real_t close = TOLERANCE * self->model->k;
+    const blw_mask_t more  = blw_guard_clipping(self);
+    blw_guard_some_t some;
+    size_t           most = 0U;
+    size_t           i    = 0U;
 
-    self->excluded = set;
-    for (size_t i = 0U; descent->gross && (i < model->head.plant->m); i++) {
-        if (guard_has(set, i)) {
-            blw_la_fill(r, BLW_R(0.0), &self->eta[i * r]);
+    if (more == 0U) {
+        return;
+    }
+    for (blw_mask_t rest = more; rest != 0U; rest >>= 1) {
+        if ((rest & 1U) != 0U) {
+            self->h[i] = blw_la_sqrt(self->suspicion[i]);
+            most       = (((more >> most) & 1U) == 0U) || (self->h[i] > self->h[most]) ? i : most;
         }
+        i++;
     }
-    if (descent->gross) {
-        blw_guard_multipliers(model, self->eta, self->l);
+    if (!blw_guard_stands_out(self, self->excluded, AT_ONCE * self->model->k)) {
+        return;
     }
-    descent->gross = false;
-    eliminate(self);
+    if (!blw_guard_list(self, self->attacked | self->excluded | more, &some)
+        || !blw_guard_move_some(self, &some, close, limit)) {
+        (void)blw_guard_list(self, self->excluded | guard_bit(most), &some);
+        (void)blw_guard_move_some(self, &some, close, limit);
+    }
 }
 
-/* Solve on without the sensors of a set.  Unless pairs keep l_I = 0 all the time, the work for that
- * is kept back, since (8) would not hold otherwise. */
+/* Updates that eliminate() takes at least. */
+static unsigned elimination_cost(const blw_guard_t *self, blw_mask_t set)
+{
+    const unsigned count = blw_mask_count(set);
+
+    if (blw_guard_exact(self, count)) {
+        return (count <= 1U) ? 1U : 4U; /* as blw_guard_move_some() has it */
+    }
+    return cost_of(self, set);
+}
+
+/* Solve on without the sensors of a set.  Unless l_I = 0 is kept all the time, the work for that is
+ * kept back, since (8) would not hold otherwise. */
 static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, descent_t *descent)
 {
-    const unsigned cost = cost_of(self, set);
-    const unsigned kept = (self->model->pairs != 0U) ? 0U : cost;
+    const unsigned cost = elimination_cost(self, set);
+    const unsigned kept = blw_guard_exact(self, blw_mask_count(set)) ? 0U : cost;
 
     if (set != self->excluded) {
         if ((self->updates + cost) > limit) {
             self->excluded = 0U;
             return false;
         }
-        exclude(self, set, descent);
+        self->excluded = set;
+        eliminate(self, limit);
     }
     descent->decides     = false;
-    const bool converged = descend(self, limit - kept, descent);
+    const bool converged = descend(self, (limit > kept) ? (limit - kept) : 0U, descent);
     if (!converged && (kept > 0U) && ((self->updates + kept) <= limit)) {
-        eliminate(self);
+        eliminate(self, limit);
     }
     return converged;
 }
 
-/* Exclude the sensor with the largest step at once if it stands out so far that the first descent
- * would end with that; else leave the choice to that descent, which may start from anywhere. */
-static void exclude_at_once(blw_guard_t *self, descent_t *descent)
+/* Exclude what stands out, and see whether it still does; else leave the choice to the first descent,
+ * which may start from anywhere. */
+static void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descent)
 {
-    const blw_guard_model_t *const model  = self->model;
-    const blw_real_t               margin = AT_ONCE * model->k;
+    const blw_real_t margin = AT_ONCE * self->model->k;
+    bool             clear  = false;
+    blw_mask_t       set    = blw_guard_choose(self, margin, &clear);
 
-    if ((model->pairs == 0U) || !descent->decides) {
+    if (!clear && !descent->fresh) {
+        survey(self, descent);
+        descent->fresh = true;
+        set            = blw_guard_choose(self, margin, &clear);
+    }
+
+    if (!clear || ((self->updates + elimination_cost(self, set)) >= limit)) {
         return;
     }
-    size_t           chosen  = 0U;
-    const blw_real_t largest = blw_guard_largest(self, 0U, &chosen);
-    if (!(largest > (model->exclude + model->k + margin))) {
-        return;
+    self->excluded = set;
+    eliminate(self, limit - 1U);
+    if (blw_guard_exact(self, blw_mask_count(set))) {
+        move_clipping(self, limit - 1U);
     }
-    descent->gross = largest > (GROSS * model->k);
-    exclude(self, guard_bit(chosen), descent);
+    self->updates++;
     survey(self, descent);
-    size_t           i = 0U;
-    const blw_real_t others =
-        blw_la_max(model->exclude, blw_guard_largest(self, self->excluded, &i));
-    descent->fresh = (self->h[chosen] - others) > margin;
+    descent->fresh = blw_guard_stands_out(self, set, margin);
     if (!descent->fresh) {
         self->excluded = 0U;
     }
@@ -325,10 +339,12 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
                                 bool *converged)
 {
     const unsigned most  = self->model->max_updates;
-    bool           clear = false;
     blw_mask_t     set   = 0U;
+    bool           clear = false;
 
-    exclude_at_once(self, descent);
+    if (descent->decides) {
+        exclude_at_once(self, 2U * limit, descent);
+    }
     if (self->excluded != 0U) {
         return self->excluded;
     }
@@ -344,15 +360,28 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
     return set;
 }
 
+/* Where the first descent starts. */
+static void start(blw_guard_t *self, descent_t *descent)
+{
+    const blw_guard_model_t *const model = self->model;
+
+    if (self->attacked != 0U) {
+        return;
+    }
+    blw_la_copy((size_t)model->head.plant->m * model->r, self->e, self->eta);
+    note_clipping(self, descent);
+    descent->gross = descent->largest > (GUARD_GROSS * model->k);
+    descent->fresh = true;
+}
+
 blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
     const bool                     search  = model->search != 0U;
-    const size_t                   N       = (size_t)model->head.plant->m * model->r;
     const unsigned                 most    = model->max_updates;
     descent_t                      descent = {.decides = self->warm_up == 0U};
 
-    blw_la_copy(N, self->e, self->eta);
+    start(self, &descent);
     const blw_mask_t set =
         find_excluded(self, search ? (most / 4U) : (most / 2U), &descent, converged);
     if (set != 0U) {
@@ -362,11 +391,11 @@ blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
     if ((set != 0U) && ((unexplained && search) || (model->search > 1U))) {
         const blw_mask_t known = unexplained ? 0U : set;
 
-        blw_la_copy(N, self->e, self->eta);
-        blw_guard_multipliers(model, self->eta, self->l);
-        self->attacked = 0U;
-        self->excluded = 0U;
-        *converged     = descend_without(self, blw_guard_search(self, known), most, &descent);
+        blw_guard_multipliers(model, self->e, self->l);
+        self->excluded         = 0U;
+        const blw_mask_t found = blw_guard_search(self, known);
+        blw_guard_start_without(self, found);
+        *converged = descend_without(self, found, most, &descent);
     }
     return *converged ? descent.pending : blw_guard_bound(self);
 }

@@ -8,7 +8,8 @@ import numpy as np
 from c_library import CLibrary, common_layouts, compile_method
 
 MODULES = ("blw_guard", "blw_guard_check", "blw_guard_search", "blw_guard_solve",
-           "blw_guard_beside", "blw_guard_bound", "blw_guard_filters", "blw_guard_S")
+           "blw_guard_beside", "blw_guard_gross", "blw_guard_relax", "blw_guard_bound",
+           "blw_guard_filters", "blw_guard_S")
 METHOD_GUARD = 7
 
 
@@ -47,7 +48,7 @@ def layouts(real: type) -> dict[str, type]:
 
 def memory_numbers(n: int, m: int, r: int, most: int) -> int:
     """BLW_GUARD_MEM."""
-    return 4 * m * r + 2 * m + 4 * n + 3 * r + most * r * (most * r + 3) // 2
+    return 4 * m * r + 2 * m + 4 * n + 4 * r + most * r * (most * r + 3) // 2
 
 
 class GuardLibrary(CLibrary):

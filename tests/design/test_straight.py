@@ -96,8 +96,8 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
                "l1_kkt", "l1_refine", "l1_support", "l1_tableau", "guard", "guard_S",
-               "guard_beside", "guard_bound", "guard_check", "guard_filters", "guard_search",
-               "guard_solve"]
+               "guard_beside", "guard_bound", "guard_check", "guard_filters", "guard_gross",
+               "guard_relax", "guard_search", "guard_solve"]
     sources = [ROOT / "lib" / "src" / f"blw_{module}.c" for module in modules]
     subprocess.run(["gcc", "-std=c99", "-O1", "-ffp-contract=off", *WIDTHS[width],
                     f"-I{ROOT / 'lib' / 'include'}", *sources, folder / f"{name}_model.c",

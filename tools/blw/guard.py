@@ -43,11 +43,14 @@ LONGEST_WARM_UP = 10_000
 DRIFT_GAIN = 1.0 / 32.0
 DRIFT_SIGMAS = 5.0
 
-#: Block updates per step and attacked unit; where several sensors are excluded jointly; and where
-#: less than RARE_CLIPPING of the benign steps need none.
-UPDATES = 4
-UPDATES_IF_JOINT = 10
-UPDATES_IF_OFTEN = 100
+#: Block updates per step and attacked unit, and one more per so many multiply-adds of one where the
+#: work beside them weighs less; where several sensors are excluded jointly without tables; and
+#: where more than RARE_CLIPPING of the benign steps need some.
+UPDATES = 6
+UPDATE_TERMS = 72
+MOST_UPDATES = 16
+UPDATES_IF_JOINT = 30
+UPDATES_IF_OFTEN = 200
 RARE_CLIPPING = 0.95
 
 #: Sensors beside the p excluded units that a Newton step has room for.
@@ -127,7 +130,7 @@ def choose_limits(
         k=k,
         exclude=exclude,
         search=search,
-        max_updates=options.max_updates or default_updates(model, pairs, search, recovery),
+        max_updates=options.max_updates or default_updates(model, bank.r, pairs, search, recovery),
         warm_up=warm_up_steps(model, kalman, bank, fusion),
         figures={
             "k": k,
@@ -205,11 +208,12 @@ def needs_search(model: Model, ratios: Array, rows: int) -> bool:
     return bool(model.p > 0 and misled and affordable and (model.p > 1 or model.groups))
 
 
-def default_updates(model: Model, pairs: bool, search: bool, recovery: float) -> int:
+def default_updates(model: Model, rows: int, pairs: bool, search: bool, recovery: float) -> int:
     """Room for the steps of an attack on p units; several times that where benign noise alone often
     clips several sensors at once, where whole groups have to be left out, or where the noise is not
     white; and twice that where a second solution follows a search."""
-    each = UPDATES if pairs else UPDATES_IF_JOINT
+    few = min(MOST_UPDATES, UPDATES + model.m * rows**2 // UPDATE_TERMS)
+    each = few if pairs else UPDATES_IF_JOINT
     if recovery < RARE_CLIPPING or model.groups or model.noise_margin > 0.0:
         each = UPDATES_IF_OFTEN
     return (2 if search else 1) * each * max(1, model.p)

@@ -116,7 +116,7 @@ typedef struct blw_guard {
     blw_real_t              *x_hat;     /* [n] */
     blw_real_t              *d;         /* [n] d_u, then x_s */
     blw_real_t              *step;      /* [most r] change of tau */
-    blw_real_t              *turned;    /* [3 r] of one sensor, in the coordinates of V */
+    blw_real_t              *turned;    /* [4 r] of one sensor, also in the coordinates of V */
     blw_real_t              *L;         /* packed lower: factor of a part of S */
     blw_mask_t               all;       /* every sensor */
     blw_mask_t               attacked;  /* sensors with nu_i /= 0 */
@@ -128,7 +128,7 @@ typedef struct blw_guard {
 /** Number of blw_real_t that init() needs; most as in the model. */
 #define BLW_GUARD_MEM(n, m, r, most) \
     ((4U * (size_t)(m) * (size_t)(r)) + (2U * (size_t)(m)) + (4U * (size_t)(n)) \
-     + (3U * (size_t)(r)) \
+     + (4U * (size_t)(r)) \
      + (((size_t)(most) * (size_t)(r) * (((size_t)(most) * (size_t)(r)) + 3U)) / 2U))
 
 /** As blw_estimator_ops.init. */
@@ -136,7 +136,8 @@ blw_status_t blw_guard_init(blw_guard_t *self, const blw_guard_model_t *model, b
                             size_t mem_len);
 /** As blw_estimator_ops.reset. */
 blw_status_t blw_guard_reset(blw_guard_t *self, const blw_real_t *x0);
-/** As blw_estimator_ops.step.  out->statistic = max_i |l_i| at nu = 0, out->threshold = k; a
+/** As blw_estimator_ops.step.  out->statistic = max_i |l_i| at nu = 0 (after a gross
+ *  attack, of the sensors that it has reached), out->threshold = k; a
  *  sensor's suspicion is from |h_i| / k, or from the slow average of l_i if that is larger.
  *  Without attack N^2 + 2 N n + N (r + n_u) multiply-adds at most; every block update adds N r, and
  *  N^2 are added once or twice where an attack is gross. */
