@@ -38,6 +38,7 @@ std::unique_ptr<MethodTables> load_bank(TableReader &tables, const blw_plant_t &
     model.horizon             = tables.integer<std::uint8_t>("horizon");
     model.groups              = tables.integer<std::uint8_t>("groups");
     model.filtered            = tables.integer<std::uint8_t>("filtered");
+    model.max_gap             = tables.integer<std::uint8_t>("max_gap");
     model.window              = tables.integer<std::uint16_t>("window");
     model.warm_up             = tables.integer<std::uint16_t>("warm_up");
     const std::size_t pairs   = std::size_t{model.sets} * model.per_set;

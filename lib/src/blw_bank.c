@@ -10,7 +10,8 @@ static BLW_COLD size_t mem_len_of(const blw_bank_model_t *model)
     const blw_plant_t *const plant    = model->head.plant;
     const size_t             averages = (size_t)model->sets * model->per_set * model->groups;
 
-    return BLW_BANK_MEM(plant->n, plant->m, model->sets, model->subsets, averages, model->horizon);
+    return BLW_BANK_MEM(plant->n, plant->m, model->sets, model->subsets, averages, model->horizon,
+                        (model->max_gap > 0U) ? 1U : 0U);
 }
 
 static void bind(blw_bank_t *self, const blw_bank_model_t *model, blw_real_t *mem)
@@ -36,6 +37,7 @@ static void bind(blw_bank_t *self, const blw_bank_model_t *model, blw_real_t *me
     self->worst     = blw_la_take(&mem, sets);
     self->gross     = blw_la_take(&mem, sets);
     self->suspicion = blw_la_take(&mem, m);
+    self->response  = blw_la_take(&mem, (model->max_gap > 0U) ? (model->subsets * n * n) : 0U);
 }
 
 BLW_COLD blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model,
@@ -69,8 +71,10 @@ BLW_COLD blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0)
     blw_la_copy(plant->n, start, self->x_hat);
     blw_la_fill((size_t)self->model->sets * plant->n, BLW_R(0.0), self->d);
     for (size_t i = 0U; i < plant->m; i++) {
-        self->age[i] = 0U;
+        self->age[i]    = 0U;
+        self->silent[i] = 0U;
     }
+    blw_la_fill((size_t)self->model->horizon * plant->m, BLW_BANK_NO_SAMPLE, self->past_e);
     self->k      = 0U;
     self->newest = 0U;
     self->choice = 0U;
@@ -78,7 +82,38 @@ BLW_COLD blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0)
     return BLW_OK;
 }
 
-/* The reference to step k, its innovations, and how long each sensor has been complete. */
+/* How long a sensor has been complete, and silent. */
+static void count_sample(blw_bank_t *self, size_t i, bool there)
+{
+    if (!there) {
+        self->age[i] = 0U;
+        if (self->silent[i] < UINT8_MAX) {
+            self->silent[i]++;
+        }
+        return;
+    }
+    self->silent[i] = 0U;
+    if (self->age[i] < self->model->horizon) {
+        self->age[i]++;
+    }
+}
+
+/* The sensors from which something can be expected: all that are not silent for good, or if every
+ * sensor sends in every step those that have sent. */
+static blw_mask_t present(const blw_bank_t *self, blw_mask_t used)
+{
+    blw_mask_t found = 0U;
+
+    if (self->model->max_gap == 0U) {
+        return used;
+    }
+    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
+        found |= (self->silent[i] <= self->model->max_gap) ? ((blw_mask_t)1U << i) : 0U;
+    }
+    return found;
+}
+
+/* The reference to step k, and its innovations. */
 static void advance_reference(blw_bank_t *self, const blw_real_t *u, const blw_real_t *y,
                               blw_mask_t used)
 {
@@ -89,15 +124,11 @@ static void advance_reference(blw_bank_t *self, const blw_real_t *u, const blw_r
     blw_real_t *const e = &self->past_e[(size_t)self->newest * plant->m];
     blw_plant_predict(plant, self->x_ref, u, self->x_bar);
     for (size_t i = 0U; i < plant->m; i++) {
-        if (((used >> i) & 1U) == 0U) {
-            e[i]         = BLW_R(0.0);
-            self->age[i] = 0U;
-            continue;
-        }
-        e[i] = (y[i] - plant->offset[i]) - blw_la_dot(n, &plant->C[i * n], self->x_bar);
-        if (self->age[i] < self->model->horizon) {
-            self->age[i]++;
-        }
+        const bool there = ((used >> i) & 1U) != 0U;
+
+        e[i] = there ? ((y[i] - plant->offset[i]) - blw_la_dot(n, &plant->C[i * n], self->x_bar))
+                     : BLW_BANK_NO_SAMPLE;
+        count_sample(self, i, there);
     }
 }
 
@@ -194,12 +225,12 @@ static void hold(blw_bank_t *self)
 
 /* The first passing set, that is the one with the least P_opt, of those that lack fewest samples.
  * @return false if none passes */
-static bool choose(blw_bank_t *self, blw_mask_t used)
+static bool choose(blw_bank_t *self, blw_mask_t expected)
 {
     unsigned fewest = BLW_BANK_MAX_SENSORS + 1U;
 
     for (size_t s = 0U; s < self->model->sets; s++) {
-        const unsigned lacking = blw_mask_count(self->model->set_mask[s] & ~used);
+        const unsigned lacking = blw_mask_count(self->model->set_mask[s] & ~expected);
 
         if ((evidence(self, s) <= BLW_R(1.0)) && (lacking < fewest)) {
             fewest       = lacking;
@@ -310,7 +341,7 @@ blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real
     if (self->k == self->model->warm_up) {
         blw_bank_judge(self);
     }
-    const bool passed = choose(self, used);
+    const bool passed = choose(self, present(self, used));
     move_reference(self);
     report(self, used, passed, out);
     return BLW_OK;

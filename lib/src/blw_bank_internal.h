@@ -4,6 +4,9 @@
 #define BLW_BANK_INTERNAL_H
 #include "blw/blw_bank.h"
 
+/** In past_e with max_gap: there was no sample. */
+#define BLW_BANK_NO_SAMPLE BLW_REAL_MAX
+
 static inline bool blw_bank_has(unsigned mask, size_t i)
 {
     return ((mask >> i) & 1U) != 0U;

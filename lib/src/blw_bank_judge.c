@@ -22,6 +22,14 @@ BLW_COLD void blw_bank_judge_reset(blw_bank_t *self)
     self->decided = false;
 }
 
+/* Where there was no sample, the block has nothing to say. */
+static void blank(size_t m, const blw_real_t *e, blw_real_t *samples)
+{
+    for (size_t i = 0U; i < m; i++) {
+        samples[i] = (e[i] >= BLW_BANK_NO_SAMPLE) ? BLW_R(0.0) : samples[i];
+    }
+}
+
 /* Samples of the block less C x_ref(t), C A x_ref(t), ...: the innovations were taken against a
  * reference that moved, and z is how far it had moved by then. */
 static void rebuild_block(blw_bank_t *self, size_t oldest)
@@ -39,6 +47,7 @@ static void rebuild_block(blw_bank_t *self, size_t oldest)
 
         blw_la_copy(m, &self->past_e[slot * m], &self->block[j * m]);
         blw_la_gemv_add(m, n, plant->C, z, &self->block[j * m]);
+        blank(m, &self->past_e[slot * m], &self->block[j * m]);
         blw_la_copy(n, z, moved);
         blw_la_axpy(n, BLW_R(1.0), &self->past_move[slot * n], moved);
         blw_la_gemv(n, n, plant->A, moved, z);
@@ -66,11 +75,57 @@ static const blw_real_t *estimate_subset(blw_bank_t *self, size_t i, const blw_r
     return &Z[n * columns];
 }
 
-/* No sample of the subset is missing in the block. */
+/* M A in the place of M. */
+static void multiply(const blw_plant_t *plant, blw_real_t *M, blw_real_t *row)
+{
+    const size_t n = plant->n;
+
+    for (size_t r = 0U; r < n; r++) {
+        blw_la_fill(n, BLW_R(0.0), row);
+        for (size_t j = 0U; j < n; j++) {
+            blw_la_axpy(n, M[(r * n) + j], &plant->A[j * n], row);
+        }
+        blw_la_copy(n, row, &M[r * n]);
+    }
+}
+
+/* M of (6) for one subset by Horner's rule, from the last samples of the block to the first. */
+static void respond(blw_bank_t *self, size_t subset, const blw_real_t *Z, size_t oldest)
+{
+    const blw_plant_t *const plant   = self->model->head.plant;
+    const uint16_t           mask    = self->model->subset_mask[subset];
+    const size_t             n       = plant->n;
+    const size_t             m       = plant->m;
+    const size_t             h       = self->model->horizon;
+    const size_t             columns = h * blw_mask_count(mask);
+    blw_real_t *const        M       = &self->response[subset * n * n];
+    size_t                   column  = columns;
+
+    blw_la_fill(n * n, BLW_R(0.0), M);
+    for (size_t j = h; j > 0U; j--) {
+        const blw_real_t *const e = &self->past_e[((oldest + (j - 1U)) % h) * m];
+
+        multiply(plant, M, self->scratch);
+        for (size_t i = m; i > 0U; i--) {
+            if (!blw_bank_has(mask, i - 1U)) {
+                continue;
+            }
+            column--;
+            for (size_t r = 0U; (r < n) && !(e[i - 1U] >= BLW_BANK_NO_SAMPLE); r++) {
+                blw_la_axpy(n, Z[(r * columns) + column], &plant->C[(i - 1U) * n], &M[r * n]);
+            }
+        }
+    }
+}
+
+/* No sample of the subset is missing in the block, or none needs to be there. */
 static bool complete(const blw_bank_t *self, size_t subset)
 {
     const uint16_t mask = self->model->subset_mask[subset];
 
+    if (self->model->max_gap > 0U) {
+        return true;
+    }
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
         if (blw_bank_has(mask, i) && (self->age[i] < self->model->horizon)) {
             return false;
@@ -85,14 +140,16 @@ static blw_real_t ratio_of(const blw_bank_t *self, size_t pair, size_t oldest)
     const blw_bank_model_t *const model = self->model;
     const size_t                  n     = model->head.plant->n;
     const size_t                  set   = pair / model->per_set;
-    const blw_real_t *const       x_i   = &self->x_fir[model->pair[pair] * n];
+    const size_t                  i     = model->pair[pair];
+    const blw_real_t *const       x_i   = &self->x_fir[i * n];
     const blw_real_t *const       x_s   = &self->past_d[((oldest * model->sets) + set) * n];
     blw_real_t                    q     = BLW_R(0.0);
 
     for (size_t j = 0U; j < n; j++) {
-        const blw_real_t rho = x_i[j] - x_s[j];
+        const blw_real_t seen =
+            (model->max_gap > 0U) ? blw_la_dot(n, &self->response[((i * n) + j) * n], x_s) : x_s[j];
 
-        q += rho * rho;
+        q += (x_i[j] - seen) * (x_i[j] - seen);
     }
     return q * model->scale[pair];
 }
@@ -148,6 +205,9 @@ void blw_bank_judge(blw_bank_t *self)
 
     rebuild_block(self, oldest);
     for (size_t i = 0U; i < model->subsets; i++) {
+        if (model->max_gap > 0U) {
+            respond(self, i, Z, oldest);
+        }
         Z = estimate_subset(self, i, Z);
     }
     for (size_t i = 0U; i < pairs; i++) {

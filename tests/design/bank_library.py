@@ -52,7 +52,7 @@ def layouts(real: type) -> dict[str, type]:
     class BankModel(ct.Structure):
         _fields_ = ([("head", common["head"])]
                     + [(k, byte) for k in ("sets", "subsets", "per_set", "horizon", "groups",
-                                           "filtered")]
+                                           "filtered", "max_gap")]
                     + [(k, word) for k in ("window", "warm_up")]
                     + [(k, words) for k in ("set_mask", "subset_mask", "pair")]
                     + [(k, real) for k in ("gain", "ceiling")]
@@ -61,10 +61,11 @@ def layouts(real: type) -> dict[str, type]:
     class Bank(ct.Structure):
         _fields_ = ([("ops", ct.c_void_p), ("model", ct.c_void_p)]
                     + [(k, pointer) for k in ("x_hat", "x_ref", "x_bar", "scratch", "d", "past_d",
-                                              "past_e", "past_move", "block", "x_fir", "average",
-                                              "worst", "gross", "suspicion")]
+                                              "past_e", "past_move", "block", "x_fir", "response",
+                                              "average", "worst", "gross", "suspicion")]
                     + [("k", word), ("blocks", word), ("newest", byte), ("choice", byte),
-                       ("decided", ct.c_bool), ("age", byte * 8), ("wait", byte * 28)])
+                       ("decided", ct.c_bool), ("age", byte * 8), ("silent", byte * 8),
+                       ("wait", byte * 28)])
 
     return common | {"model": BankModel, "bank": Bank}
 

@@ -14,7 +14,7 @@
 #define BANK_PER_SET 2U
 #define BANK_PAIRS   (BANK_SETS * BANK_PER_SET)
 #define BANK_HORIZON 2U
-#define BANK_MEM     BLW_BANK_MEM(1, 3, BANK_SETS, 3U, 2U * BANK_PAIRS, BANK_HORIZON)
+#define BANK_MEM     BLW_BANK_MEM(1, 3, BANK_SETS, 3U, 2U * BANK_PAIRS, BANK_HORIZON, 1U)
 
 /** Longer than BLW_BANK_MAX_SENSORS, for the test of that limit. */
 #define BANK_SENSORS 9U

@@ -139,6 +139,36 @@ static void test_step_given_a_gap_prefers_complete_sets_and_waits_for_complete_b
     TEST_ASSERT_TRUE(bank.average[1] < BLW_R(0.25));
 }
 
+static void test_step_given_seldom_samples_judges_a_block_by_those_it_has(void)
+{
+    made.model.max_gap = 1U;
+    start_bank();
+    step_with(1.0, 0.0, 4.0, 0.0, 7U); /* x_s = 2, 1, 2 */
+    step_with(1.5, 0.0, 0.0, 0.0, 5U);
+    /* x_0 = x_2 = 1; sensor 1 has its first sample only: 0.6 (5 - x_s) */
+    const double expected[BANK_PAIRS] = {0.75, 1.87, 0.25, 0.25, 1.87, 0.75};
+    for (size_t i = 0U; i < BANK_PAIRS; i++) {
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, expected[i], bank.average[i]);
+    }
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 1.5, out.x_hat[0]);
+    TEST_ASSERT_EQUAL_HEX64(2U, out.excluded);
+}
+
+static void test_step_given_seldom_samples_leaves_a_sensor_out_after_the_gap_only(void)
+{
+    made.model.max_gap = 1U;
+    start_bank();
+    step_with(1.0, 0.0, 0.0, 0.0, 7U);
+    step_with(1.5, 0.0, 0.0, 0.0, 5U);
+    TEST_ASSERT_EQUAL_UINT8(0U, bank.choice); /* {0,1}, although sensor 1 has not sent now */
+    step_with(1.75, 0.0, 0.0, 0.0, 5U);
+    TEST_ASSERT_EQUAL_UINT8(1U, bank.choice); /* {0,2} */
+    for (size_t k = 0U; k < 300U; k++) {
+        TEST_ASSERT_EQUAL_INT(BLW_OK, blw_bank_step(&bank, u, made.offset, 5U, &out));
+    }
+    TEST_ASSERT_EQUAL_UINT8(UINT8_MAX, bank.silent[1]);
+}
+
 static void test_step_given_no_sample_predicts_and_says_so(void)
 {
     step_with(0.0, 0.0, 0.0, 0.0, 0U);
@@ -276,6 +306,8 @@ int main(void)
     RUN_TEST(test_step_given_no_passing_set_leaves_a_choice_that_the_gate_rejects);
     RUN_TEST(test_step_given_no_passing_set_holds_the_last_choice);
     RUN_TEST(test_step_given_a_gap_prefers_complete_sets_and_waits_for_complete_blocks);
+    RUN_TEST(test_step_given_seldom_samples_judges_a_block_by_those_it_has);
+    RUN_TEST(test_step_given_seldom_samples_leaves_a_sensor_out_after_the_gap_only);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);
     RUN_TEST(test_step_given_a_window_decides_at_its_end_with_fresh_sums);
     RUN_TEST(test_step_given_random_data_follows_the_textbook_whatever_the_reference);

@@ -31,7 +31,7 @@ static void test_init_given_null_or_little_memory_refuses(void)
 {
     const size_t needed = blw_bank_ops.mem_len(&made.model.head);
 
-    TEST_ASSERT_EQUAL_size_t(BLW_BANK_MEM(1, 3, 3, 3, 6, 2), needed);
+    TEST_ASSERT_EQUAL_size_t(BLW_BANK_MEM(1, 3, 3, 3, 6, 2, 0), needed);
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_bank_init(NULL, &made.model, mem, needed));
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_bank_init(&bank, NULL, mem, needed));
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_bank_init(&bank, &made.model, NULL, needed));

@@ -18,12 +18,14 @@ from blw.model import Model
 from blw.tables import Struct, index, real, table
 
 NAME = "bank"
-AVERAGES = False
+AVERAGES = True
 
 CEILING = 1.5             # of an average over its threshold: it recovers in a third of the memory
 SETTLED = 0.01            # part of P_opt that the initial error may still hold
 UNKNOWN_START = 1e4       # times P: the initial error covariance that is provided for without P0
 MAX_WARM_UP = 60000
+MAX_GAP = 3.0             # samples of the slowest sensor that have to fail to come
+MOST_GAP = 254            # steps that the device can tell from silence
 WORTHWHILE = 0.8          # of epsilon: a longer horizon that leaves more is not proposed
 
 Array = NDArray[np.float64]
@@ -38,9 +40,16 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     bank = build(model, options)
     warm_up = _warm_up(model, kalman, bank)
     sizes = (model.n, model.m, len(bank.members), len(bank.blocks),
-             len(bank.tests) * bank.groups, bank.horizon)
+             len(bank.tests) * bank.groups, bank.horizon, int(_max_gap(model) > 0))
     return Designed(_tables(model, options, bank, warm_up), _info(model, options, bank, warm_up),
                     mem=sizes)
+
+
+def _max_gap(model: Model) -> int:
+    """Steps in which a few samples of the slowest sensor should have come; 0 if all send always."""
+    if np.all(model.rate == 1.0):
+        return 0
+    return min(MOST_GAP, int(np.ceil(MAX_GAP / model.rate.min())))
 
 
 def _warm_up(model: Model, kalman: Kalman, bank: Bank) -> int:
@@ -59,7 +68,8 @@ def _warm_up(model: Model, kalman: Kalman, bank: Bank) -> int:
 
 
 def _tables(model: Model, options: Options, bank: Bank, warm_up: int) -> Struct:
-    K = np.concatenate([member.K[:, list(member.sensors)].ravel() for member in bank.members])
+    K = np.concatenate([(member.K * model.weight)[:, list(member.sensors)].ravel()
+                        for member in bank.members])
     Z = np.concatenate([_padded(model, block, bank.horizon) for block in bank.blocks])
     limits = np.array([test.limit for test in bank.tests])
     variances = np.concatenate([_innovation_variance(model, member) for member in bank.members])
@@ -70,6 +80,7 @@ def _tables(model: Model, options: Options, bank: Bank, warm_up: int) -> Struct:
         "horizon": bank.horizon,
         "groups": bank.groups,
         "filtered": int(options.version == "filter"),
+        "max_gap": _max_gap(model),
         "window": 0 if options.window == "ewma" else options.window,
         "warm_up": warm_up,
         "set_mask": index([_mask(member.sensors) for member in bank.members],
@@ -91,16 +102,17 @@ def _tables(model: Model, options: Options, bank: Bank, warm_up: int) -> Struct:
 
 
 def _innovation_variance(model: Model, member: Member) -> Array:
-    """[size of the set] of each of its sensors."""
+    """[size of the set] of single samples of each of its sensors."""
     C = model.C[list(member.sensors)]
-    return np.einsum("ij,jk,ik->i", C, member.Pp, C) + np.diag(model.R)[list(member.sensors)]
+    R = np.diag(model.sample_R)[list(member.sensors)]
+    return np.einsum("ij,jk,ik->i", C, member.Pp, C) + R
 
 
 def _padded(model: Model, block: Block, horizon: int) -> Array:
-    """Z with zeros for the steps beyond the block's own horizon, flat."""
+    """Z with zeros for the steps beyond the block's own horizon, flat; for samples as they come."""
     Z = np.zeros((model.n, horizon * len(block.sensors)))
     Z[:, :block.Z.shape[1]] = block.Z
-    return Z.ravel()
+    return (Z * np.tile(model.weight[list(block.sensors)], horizon)).ravel()
 
 
 def _mask(sensors: Sensors) -> int:
@@ -167,15 +179,20 @@ def footprint(model: Model, bank: Bank) -> dict[str, int]:
     sizes = [len(member.sensors) for member in bank.members]
     thetas = [len(block.sensors) for block in bank.blocks]
     h, tests = bank.horizon, len(bank.tests)
+    seldom = int(_max_gap(model) > 0)
     return {
         "table_numbers": (n + 1) * sum(sizes) + n * h * sum(thetas) + 2 * tests + 2,
         "index_numbers": len(sizes) + len(thetas) + tests,
-        "memory_numbers": memory_numbers(n, m, len(sizes), len(thetas), tests * bank.groups, h),
+        "memory_numbers": memory_numbers(n, m, len(sizes), len(thetas), tests * bank.groups, h,
+                                         seldom),
         "multiply_adds": (n * (n + l + m) + sum(n * n + 2 * (n + 1) * size for size in sizes)
-                          + h * n * (n + m) + n * h * sum(thetas) + tests * (n + 2)),
+                          + h * n * (n + m) + n * h * sum(thetas) + tests * (n + 2)
+                          + seldom * (h * n * n * (n * len(thetas) + sum(thetas)) + tests * n * n)),
     }
 
 
-def memory_numbers(n: int, m: int, sets: int, subsets: int, averages: int, horizon: int) -> int:
+def memory_numbers(n: int, m: int, sets: int, subsets: int, averages: int, horizon: int,
+                   seldom: int) -> int:
     """BLW_BANK_MEM of blw_bank.h."""
-    return (horizon * (sets * n + 2 * m + n) + (sets + subsets + 5) * n + averages + 2 * sets + m)
+    return (horizon * (sets * n + 2 * m + n) + (sets + subsets + 5) * n + averages + 2 * sets + m
+            + seldom * subsets * n * n)

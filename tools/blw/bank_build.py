@@ -134,7 +134,7 @@ def build(model: Model, options: Options) -> Bank:
         raise DesignError(f"window = {options.window} is not a multiple of the {groups} groups of "
                           "blocks")
     gain = (2.0 / (options.memory + 1) if options.window == "ewma" else groups / options.window)
-    tests = _tests(noise, options, members, blocks, (groups, gain), margin.sigma(model))
+    tests = _tests(model, options, members, blocks, (groups, gain))
     return Bank(members, blocks, tests, horizon, groups, gain)
 
 
@@ -216,17 +216,31 @@ def _observability_index(model: Model, subset: Sensors) -> int:
     return model.n
 
 
-def _tests(noise: moments.Noise, options: Options, members: list[Member], blocks: list[Block],
-           averaging: tuple[int, float], bounds: Array) -> list[Test]:
+def _with_gaps(model: Model, member: Member) -> moments.Noise:
+    """The noise of samples that count 1/q times in a share q of the steps, about one set's filter.
+
+    What is averaged over the steps in which a sensor sends tells by how much the innovation C e + v
+    varies from step to step: v is in R / q; the rest is (1/q - 1) C e e' C', as if all samples of a
+    step came together or not at all, as those of a frame do.
+    """
+    lost = np.sqrt(model.weight - 1.0)
+    unsent = np.outer(lost, lost) * (model.C @ member.Pp @ model.C.T)
+    return moments.Noise(model.A, model.C, model.W, model.R + unsent)
+
+
+def _tests(model: Model, options: Options, members: list[Member], blocks: list[Block],
+           averaging: tuple[int, float]) -> list[Test]:
     """All pairs of a set and a subset of it, set by set.
 
     A disturbance that moves the residue by at most delta raises the root of its mean square by no
     more than that.
     """
     groups, gain = averaging
+    bounds = margin.sigma(model)
     filtered = options.version == "filter"
     found = []
     for number, member in enumerate(members):
+        noise = _with_gaps(model, member)
         inside = [i for i, block in enumerate(blocks) if set(block.sensors) <= set(member.sensors)]
         risk = options.false_rejection / (len(inside) * groups)
         for i in inside:

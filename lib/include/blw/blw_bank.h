@@ -25,6 +25,12 @@
  *  of the average (4) and counts as its benign mean in (5).  Among passing sets, those that lack
  *  fewest samples now come first.  An average stops at the ceiling, so that it recovers from any
  *  attack in a bounded number of steps.
+ *
+ *  Sensors that send seldom (max_gap > 0): in K and Z a sample counts for all the steps that it
+ *  stands for, and a block is compared as it is, by
+ *      rho = Z_i Y_i - M_i x_s(t),   M_i = sum over the samples there are of Z_ij C_i A^j      (6)
+ *  in place of x_i - x_s, which it is in the mean: Z_i O_i = I.  A sensor lacks samples only when
+ *  it has sent none for more than max_gap steps.
  */
 #ifndef BLW_BANK_H
 #define BLW_BANK_H
@@ -46,6 +52,7 @@ typedef struct blw_bank_model {
     uint8_t           horizon;     /**< h, samples in a block, >= 1 */
     uint8_t           groups;      /**< averages of a pair, >= 1; more only with a window */
     uint8_t           filtered;    /**< 1: x_s of (1) is tested and returned; 0: x_bar_s */
+    uint8_t           max_gap;     /**< steps after which a sensor is silent; 0: all send always */
     uint16_t          window;      /**< blocks in a window, a multiple of groups; 0: average (4) */
     uint16_t          warm_up;     /**< step of the first test, >= horizon */
     const uint16_t   *set_mask;    /**< [sets] sensors of a set, bit i for sensor i */
@@ -74,6 +81,7 @@ typedef struct blw_bank {
     blw_real_t             *past_move; /* [h][n] x_ref - x_bar */
     blw_real_t             *block;     /* [h x m] samples less those of an unmoved reference */
     blw_real_t             *x_fir;     /* [subsets x n] x_i - x_ref at the start of the block */
+    blw_real_t             *response;  /* [subsets][n x n] M of (6); only with max_gap */
     blw_real_t             *average;   /* [sets x per_set x groups] of q times scale */
     blw_real_t             *worst;     /* [sets] largest average at the last decision */
     blw_real_t             *gross;     /* [sets] largest innovation^2 of this step, gated */
@@ -84,14 +92,17 @@ typedef struct blw_bank {
     uint8_t                 choice;    /* the set that is returned */
     bool                    decided;   /* at least once since reset */
     uint8_t                 age[BLW_BANK_MAX_SENSORS]; /* samples since the last gap, at most h */
-    uint8_t                 wait[BLW_BANK_MAX_SETS];   /* steps that a gate keeps the set out */
+    uint8_t                 silent[BLW_BANK_MAX_SENSORS]; /* steps since the last sample, or 255 */
+    uint8_t                 wait[BLW_BANK_MAX_SETS];      /* steps that a gate keeps the set out */
 } blw_bank_t;
 
-/** Number of blw_real_t that init() needs; averages = sets x per_set x groups. */
-#define BLW_BANK_MEM(n, m, sets, subsets, averages, horizon) \
+/** Number of blw_real_t that init() needs; averages = sets x per_set x groups, seldom = 1 with
+ *  max_gap > 0, else 0. */
+#define BLW_BANK_MEM(n, m, sets, subsets, averages, horizon, seldom) \
     (((size_t)(horizon) * (((size_t)(sets) * (size_t)(n)) + (2U * (size_t)(m)) + (size_t)(n))) \
      + (((size_t)(sets) + (size_t)(subsets) + 5U) * (size_t)(n)) + (size_t)(averages) \
-     + (2U * (size_t)(sets)) + (size_t)(m))
+     + (2U * (size_t)(sets)) + (size_t)(m) \
+     + ((size_t)(seldom) * (size_t)(subsets) * (size_t)(n) * (size_t)(n)))
 
 /** As blw_estimator_ops.init. */
 blw_status_t blw_bank_init(blw_bank_t *self, const blw_bank_model_t *model, blw_real_t *mem,
@@ -104,7 +115,8 @@ blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0);
  *  set holds, or with BLW_OUTCOME_HELD those that the last choice leaves out.
  *  With s = |set|, theta = |subset|, the same whatever the data:
  *      n (n + l + m) + sum over sets (n n + 2 s (n + 1)) + h n (n + m) + sum over subsets h n theta
- *      + sets per_set (n + 2) multiply-adds. */
+ *      + sets per_set (n + 2) multiply-adds;
+ *  with max_gap > 0 also  subsets h (n n n + theta n n) + sets per_set n n. */
 blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real_t *y,
                            blw_mask_t valid, blw_estimator_out_t *out);
 
