@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Method `bank` on sensors that send seldom: the C library against (6) of blw_bank.h, and its rates.
-"""
+"""Method `bank` on sensors that send seldom: the C library against (6) of blw_bank.h."""
 
 import numpy as np
 import pytest

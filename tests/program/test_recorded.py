@@ -47,10 +47,10 @@ def run(bulwark, folder, out, kept, *methods):
 def test_recorded_car_with_lossy_frames_is_estimated_nearly_as_by_the_oracle(bulwark, data,
                                                                              tmp_path):
     case, = run(bulwark, data / "rav4_verifiedcan", tmp_path / "out", {"P1", "P2", "P6"},
-                "guard", "decentral")
+                "guard", "decentral", "bank")
     assert case["p"] == {"sensors": 2, "groups": 1}
     assert min(case["rate"]) < 0.1 and case["noise_margin"] == 0.5
-    for name in ("guard", "decentral"):
+    for name in ("guard", "decentral", "bank"):
         told = case["methods"][name]
         assert told["median_to_oracle"] < 2.0
         assert told["worst"] < 0.040  # of the brute-force bank in the data's description
