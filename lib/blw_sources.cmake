@@ -36,6 +36,8 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_kkt.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_refine.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_support.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton_step.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_tableau.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_la.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_lasso.c

@@ -41,6 +41,7 @@ const blw_l1_ops_t *engine(const JsonNode &name)
     static const std::map<std::string, const blw_l1_ops_t *> known = {
         {"active_set", &blw_l1_active_set_ops},
         {"admm", &blw_l1_admm_ops},
+        {"newton", &blw_l1_newton_ops},
         {"tableau", &blw_l1_tableau_ops},
     };
     const auto found = known.find(name.text());

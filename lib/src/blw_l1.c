@@ -162,6 +162,11 @@ BLW_COLD void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_
         self->L = &self->step[N + model->n];
         self->z = &self->L[blw_la_packed_row(N)];
     }
+    if ((model->Z == NULL) && blw_l1_has_pairs(model)) {
+        self->z  = &self->L[blw_la_packed_row(N + model->n)];
+        self->dz = &self->z[N];
+        self->A  = &self->dz[N];
+    }
     blw_l1_reset(self);
 }
 

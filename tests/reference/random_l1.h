@@ -135,7 +135,7 @@ public:
         m.F              = F_table_.data();
         m.c              = c_table_.data();
         m.M              = (engine == &blw_l1_admm_ops) ? M_table_.data() : nullptr;
-        if (engine == &blw_l1_tableau_ops) {
+        if ((engine == &blw_l1_tableau_ops) || (engine == &blw_l1_newton_ops)) {
             m.Z = nullptr;
             m.S = S_table_.data();
             m.W = W_table_.data();

@@ -103,35 +103,37 @@ void check_bound(Problem &problem, unsigned seed, const blw_l1_ops_t *engine)
     }
 }
 
+// The engine that the design tool chooses.
+const blw_l1_ops_t *engine_in_W(bool pairs)
+{
+    return pairs ? &blw_l1_newton_ops : &blw_l1_tableau_ops;
+}
+
 void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
 {
     for (const double threshold : {0.3, 1.0, 3.0}) {
         Problem    problem(seed, sizes, n, threshold);
         const bool pairs = std::size_t(problem.rows()) != sizes.size();
         for (const blw_l1_ops_t *engine :
-             {&blw_l1_active_set_ops, &blw_l1_admm_ops, &blw_l1_tableau_ops}) {
-            if (pairs && (engine == &blw_l1_tableau_ops)) {
-                continue;
-            }
-            Solver solver(problem, engine, 3000);
+             {&blw_l1_active_set_ops, &blw_l1_admm_ops, engine_in_W(pairs)}) {
+            Solver solver(problem, engine, (engine == &blw_l1_newton_ops) ? 64 : 3000);
             for (int k = 0; k < 6; ++k) {
                 check_solution(problem, solver, seed, (k % 3 == 2) ? 100.0 : 2.0 * k);
             }
         }
         check_bound(problem, seed, &blw_l1_active_set_ops);
-        if (!pairs) {
-            check_bound(problem, seed, &blw_l1_tableau_ops);
-        }
+        check_bound(problem, seed, engine_in_W(pairs));
     }
 }
 
 // Rows of Z that are nearly dependent and thresholds far below the attack: whatever the support, the
 // objective does not rise above where it starts, nu = 0.
-void check_descent(unsigned seed, const std::vector<int> &sizes, int n)
+void check_descent(unsigned seed, const std::vector<int> &sizes, int n,
+                   const blw_l1_ops_t *engine = &blw_l1_active_set_ops)
 {
     for (const double least : {1e-3, 1e-5, 1e-10}) {
         Problem problem(seed, sizes, n, 1e-3, least);
-        Solver  solver(problem, &blw_l1_active_set_ops, 8 * problem.rows());
+        Solver  solver(problem, engine, 8 * problem.rows());
         for (int k = 0; k < 40; ++k) {
             const Vector zeta  = rounded(problem.sample((k % 4 == 3) ? 100.0 : 1.0));
             const Vector x     = solver.solve(zeta);
@@ -173,6 +175,7 @@ int main()
         check_problem(seed, std::vector<int>(3 + seed % 4, 2), 2);
         check_descent(seed, std::vector<int>(12 + seed % 20, 1), 3);
         check_descent(seed, std::vector<int>(6 + seed % 10, 2), 4);
+        check_descent(seed, std::vector<int>(6 + seed % 10, 2), 4, &blw_l1_newton_ops);
         check_degenerate(seed, 4, 2 + int(seed % 3));
     }
     std::printf("%d failures\n", failures);

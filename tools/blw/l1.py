@@ -30,6 +30,7 @@ Array = NDArray[Any]
 ACTIVE_SET = Link("blw_l1_active_set_ops", "active_set")
 ADMM = Link("blw_l1_admm_ops", "admm")
 TABLEAU = Link("blw_l1_tableau_ops", "tableau")
+NEWTON = Link("blw_l1_newton_ops", "newton")
 
 #: Part of a row's information that is redundant; below this it is rounding.
 _NOT_REDUNDANT = 1e-12
@@ -240,6 +241,7 @@ def struct(
     c = thresholds(reduced_form, groups, gamma)
     kappa_G, kappa_W = kappas(reduced_form, groups, c)
     tableau = engine.link is TABLEAU
+    in_W = tableau or engine.link is NEWTON
     packed = "[N(N+1)/2] packed lower"
     scaled_F = F / reduced_form.scale
     M = None if engine.M is None else table(pack_lower(engine.M), "[N(N+1)/2] (S + rho I)^-1")
@@ -254,15 +256,15 @@ def struct(
             "n": F.shape[0],
             "engine": engine.link,
             "first": index(groups.first, "[n_groups + 1] first row of each group, then N"),
-            "Z": None if tableau else table(pack_trapezoid(Z), f"[{N} x {d}] trapezoid, packed"),
+            "Z": None if in_W else table(pack_trapezoid(Z), f"[{N} x {d}] trapezoid, packed"),
             "F": table(scaled_F, f"[{F.shape[0]} x {N}]"),
             "c": table(c, "[n_groups] gamma w_g / s_g"),
             "M": M,
-            "S": table(pack_lower(reduced_form.S), f"{packed}: Z Z'") if tableau else None,
-            "W": table(pack_lower(reduced_form.W), packed) if tableau else None,
-            "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if tableau else None,
+            "S": table(pack_lower(reduced_form.S), f"{packed}: Z Z'") if in_W else None,
+            "W": table(pack_lower(reduced_form.W), packed) if in_W else None,
+            "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if in_W else None,
             "P": table(pack_lower(scaled_F @ reduced_form.W @ scaled_F.T), "[n(n+1)/2] F W F'")
-            if tableau else None,
+            if in_W else None,
             "fast": l1_straight.kernels(f"{suffix}_fast", N, F.shape[0]) if tableau else None,
             "rho": real(engine.rho),
             "kappa_G": real(kappa_G),

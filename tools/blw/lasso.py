@@ -32,6 +32,9 @@ GAMMA_KEYS = ("gamma", "recovery_probability", "benign_loss")
 #: Mean square error without attack above that of the Kalman filter, as a part of it.
 DEFAULT_BENIGN_LOSS = 0.1
 
+#: Bound on the Newton steps of one solve: those that converge need about 20, whatever the model.
+NEWTON_STEPS = 64
+
 #: Passes per row that the device keeps back from ADMM for the exact solve on the support.
 SUPPORT_RESERVE = 2
 
@@ -171,10 +174,9 @@ def choose_engine(
     """Engine and its bound on work; only `admm` is tuned, and only on request."""
     N, d = problem.reduced.Z.shape
     paired = problem.groups.count < N
-    pivots = (8 if paired else 4) * N
     if options.engine != "admm":
-        bound = options.max_iterations or pivots
-        link = l1.ACTIVE_SET if paired else l1.TABLEAU
+        bound = options.max_iterations or (NEWTON_STEPS if paired else 4 * N)
+        link = l1.NEWTON if paired else l1.TABLEAU
         return l1.Engine(link, bound), {
             "engine": "active_set",
             "max_iterations": bound,

@@ -33,6 +33,8 @@ extern const blw_l1_ops_t blw_l1_active_set_ops;
 extern const blw_l1_ops_t blw_l1_admm_ops;
 /** Groups of one row only: pivots on the tableau of S, verified in W. */
 extern const blw_l1_ops_t blw_l1_tableau_ops;
+/** Groups of one row or two: smoothed Newton steps in W. */
+extern const blw_l1_ops_t blw_l1_newton_ops;
 
 /** What a pass over the rows of the tableau found. */
 typedef struct blw_l1_survey {
@@ -70,22 +72,22 @@ typedef struct blw_l1_kernels {
 } blw_l1_kernels_t;
 
 typedef struct blw_l1_model {
-    uint16_t                N;              /**< rows of zeta */
-    uint16_t                d;              /**< columns of Z, N - n */
-    uint16_t                n_groups;       /**< groups */
-    uint16_t                max_iterations; /**< bound on pivots or passes in one solve */
-    uint8_t                 n;              /**< states */
-    const blw_l1_ops_t     *engine;         /**< one of the above */
-    const uint16_t         *first;          /**< [n_groups + 1] first row of each group, then N */
-    const blw_real_t       *Z;       /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL for tableau */
-    const blw_real_t       *F;       /**< [n x N] */
-    const blw_real_t       *c;       /**< [n_groups] thresholds, > 0 */
-    const blw_real_t       *M;       /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
+    uint16_t            N;              /**< rows of zeta */
+    uint16_t            d;              /**< columns of Z, N - n */
+    uint16_t            n_groups;       /**< groups */
+    uint16_t            max_iterations; /**< bound on pivots or passes in one solve */
+    uint8_t             n;              /**< states */
+    const blw_l1_ops_t *engine;         /**< one of the above */
+    const uint16_t     *first;          /**< [n_groups + 1] first row of each group, then N */
+    const blw_real_t   *Z;              /**< [BLW_L1_Z_LEN(N, d)] packed trapezoid; NULL without */
+    const blw_real_t   *F;              /**< [n x N] */
+    const blw_real_t   *c;              /**< [n_groups] thresholds, > 0 */
+    const blw_real_t   *M;              /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
                                            NULL otherwise */
-    const blw_real_t       *S;       /**< tableau: [N (N + 1) / 2] Z Z', packed lower, or NULL */
-    const blw_real_t       *W;       /**< tableau: [N (N + 1) / 2] packed lower, or NULL */
-    const blw_real_t       *G;       /**< tableau: [N x n], or NULL */
-    const blw_real_t       *P;       /**< tableau: [n (n + 1) / 2] F W F', packed lower, or NULL */
+    const blw_real_t   *S; /**< tableau, newton: [N (N + 1) / 2] Z Z', packed lower, or NULL */
+    const blw_real_t   *W; /**< tableau, newton: [N (N + 1) / 2] packed lower, or NULL */
+    const blw_real_t   *G; /**< tableau, newton: [N x n], or NULL */
+    const blw_real_t   *P; /**< tableau, newton: [n (n + 1) / 2] F W F', packed lower, or NULL */
     const blw_l1_kernels_t *fast;    /**< all of its members for the tableau, or NULL */
     blw_real_t              rho;     /**< ADMM: penalty, > 0; 0 otherwise */
     blw_real_t              kappa_G; /**< error bound, see blw_l1_info_t: sum_g c_g |(G x)_g| is at
@@ -128,17 +130,21 @@ typedef struct blw_l1_info {
  *  whose curvature holds them apart. */
 #define BLW_L1_ROWS(N, d, n_groups) (((n_groups) == (N)) ? ((size_t)(d) + 1U) : (size_t)(N))
 
-/** Number of blw_real_t that init() needs: engines on Z, and the tableau. */
+/** Number of blw_real_t that init() needs: engines on Z, the tableau, and Newton steps. */
 #define BLW_L1_MEM_Z(N, d, n_groups) \
     ((4U * (size_t)(N)) + (2U * (size_t)(d)) + (size_t)(n_groups) \
      + ((BLW_L1_ROWS(N, d, n_groups) * (BLW_L1_ROWS(N, d, n_groups) + 1U)) / 2U))
 #define BLW_L1_MEM_TABLEAU(N, d) \
     ((5U * (size_t)(N)) - (size_t)(d) \
      + ((((2U * (size_t)(N)) - (size_t)(d)) * (((2U * (size_t)(N)) - (size_t)(d)) + 1U)) / 2U))
+#define BLW_L1_MEM_NEWTON(N, d, n_groups) \
+    (BLW_L1_MEM_TABLEAU(N, d) + (5U * (size_t)(N)) - (size_t)(d) + (size_t)(n_groups))
 /** The same, whatever the engine. */
+#define BLW_L1_MEM_W(N, d, n_groups) \
+    (((n_groups) == (N)) ? BLW_L1_MEM_TABLEAU(N, d) : BLW_L1_MEM_NEWTON(N, d, n_groups))
 #define BLW_L1_MEM(N, d, n_groups) \
-    ((BLW_L1_MEM_Z(N, d, n_groups) > BLW_L1_MEM_TABLEAU(N, d)) ? BLW_L1_MEM_Z(N, d, n_groups) \
-                                                               : BLW_L1_MEM_TABLEAU(N, d))
+    ((BLW_L1_MEM_Z(N, d, n_groups) > BLW_L1_MEM_W(N, d, n_groups)) ? BLW_L1_MEM_Z(N, d, n_groups) \
+                                                                   : BLW_L1_MEM_W(N, d, n_groups))
 
 /** Add the tables to a walk and check dimensions, groups, signs and what the engine needs. */
 blw_status_t blw_l1_check(const blw_l1_model_t *model, blw_table_check_t *check);

@@ -1,0 +1,383 @@
+/* SPDX-License-Identifier: MIT */
+/* Newton engine for (2) in blw_l1.h, groups of one row or two, by continuation [Madsen, Nielsen,
+ * "A finite smoothing algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)].  |nu_g| is
+ * rounded off below w = kappa width_g, width_g = the benign standard deviation of zeta_g:
+ *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|.                                (1)
+ * The objective is then smooth, l_g = c_g nu_g / max(|nu_g|, w), and a group is either inside, where this
+ * is linear, or outside, where only a pair can still turn.  A Newton step solves the optimality
+ * conditions for the present groups inside and outside (blw_l1_newton_step.c); a search along it keeps
+ * the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no group has
+ * changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
+ * Few rows are inside in the end, often hardly more than n, so that a step is cheap. */
+#include "blw_l1_newton.h"
+
+/* First kappa, ratio of the next, and the least for which it is worth while. */
+#define KAPPA_FIRST BLW_R(10.0)
+#define KAPPA_GROSS BLW_R(0.1) /* the first, relative to l_g / width_g, if that is larger */
+#define KAPPA_RATIO BLW_R(0.1)
+#define KAPPA_LAST  BLW_R(1e-6)
+
+/* Most steps for one kappa, and for kappa = 0. */
+#define STEPS       12U
+#define STEPS_FINAL 8U
+
+/* Most groups that may change sides in one step with kappa = 0. */
+#define WRONG 6U
+
+/* Least share of a step that is worth another. */
+#define STUCK BLW_R(1e-9)
+
+/* Residual |l_g - c_g nu_g / max(|nu_g|, w)| / c_g that is good enough to go on. */
+#define SETTLED BLW_R(0.1)
+
+/* Search: most halvings, slope at the end of a whole step that is let pass, and of a shorter one, as
+ * parts of the first slope. */
+#define HALVINGS    30U
+#define SLOPE_WHOLE BLW_R(0.5)
+#define SLOPE_LEFT  BLW_R(0.25)
+#define NOISE \
+    (BLW_R(64.0) * BLW_REAL_EPS) /* of the objective: what rounding may leave of a slope */
+
+/* Last change of x, in standard deviations: its square is below rounding. */
+#ifdef BLW_REAL_DOUBLE
+#define SMALL BLW_R(1e-7)
+#else
+#define SMALL BLW_R(1e-4)
+#endif
+
+/* Direction and side of every group for the present nu; with keep, only directions.
+ * @return groups that changed sides. */
+static size_t aim(const blw_l1_newton_t *at, bool keep)
+{
+    blw_l1_t *const             self  = at->l1;
+    const blw_l1_model_t *const m     = self->model;
+    size_t                      moved = 0U;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t     i      = m->first[g];
+        const bool       before = blw_l1_outside(self, g, i);
+        blw_real_t       nu[2];
+        const blw_real_t norm    = blw_l1_nu(at, g, nu);
+        const bool       outside = keep ? before : (norm > (at->kappa * self->A[g]));
+        for (size_t j = i; (j < m->first[g + 1U]) && !(keep && (norm <= BLW_R(0.0))); j++) {
+            self->dir[j] = outside ? (nu[j - i] / norm) : BLW_R(0.0);
+        }
+        moved += (outside != before) ? 1U : 0U;
+    }
+    return moved;
+}
+
+/* Slope of the objective along the step at alpha, given its part from |z|^2. */
+static blw_real_t slope(const blw_l1_newton_t *at, blw_real_t alpha, blw_real_t quadratic)
+{
+    const blw_l1_t *const       self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+    blw_real_t                  sum  = quadratic;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t            i = m->first[g];
+        const blw_real_t *const d = &self->dz[i];
+        blw_real_t              nu[2];
+        blw_real_t              rate;
+        blw_real_t              norm = blw_l1_nu(at, g, nu);
+        nu[0] -= alpha * d[0];
+        if (blw_l1_size(m, g) == 2U) {
+            nu[1] -= alpha * d[1];
+            rate = (nu[0] * d[0]) + (nu[1] * d[1]);
+            norm = blw_la_norm(2U, nu);
+        } else {
+            rate = nu[0] * d[0];
+            norm = blw_la_abs(nu[0]);
+        }
+        sum -= (m->c[g] * rate) / blw_la_max(norm, at->kappa * self->A[g]);
+    }
+    return sum;
+}
+
+/* Objective (2) at tau, with l = S tau. */
+static blw_real_t objective(const blw_l1_t *self, const blw_real_t *zeta)
+{
+    const blw_l1_model_t *const m   = self->model;
+    blw_real_t                  sum = BLW_R(0.5) * blw_la_dot(m->N, self->tau, self->l);
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        sum += m->c[g] * blw_l1_nu_norm(self, zeta, g);
+    }
+    return sum;
+}
+
+/* Share of the step that does not pass the minimum along it by far. */
+static blw_real_t search(const blw_l1_newton_t *at)
+{
+    const blw_l1_t *const self  = at->l1;
+    const size_t          N     = self->model->N;
+    const blw_real_t      first = blw_la_dot(N, self->dz, self->l);
+    const blw_real_t      bend  = blw_la_dot(N, self->dz, self->z);
+    const blw_real_t      noise = NOISE * objective(self, at->zeta);
+    const blw_real_t      most  = blw_la_abs(slope(at, BLW_R(0.0), first));
+    blw_real_t            low   = BLW_R(0.0);
+    blw_real_t            high  = BLW_R(1.0);
+    blw_real_t            alpha = BLW_R(1.0);
+    blw_real_t            rise  = slope(at, alpha, first + bend);
+
+    if (rise <= ((SLOPE_WHOLE * most) + noise)) {
+        return alpha;
+    }
+    for (size_t h = 0U; (h < HALVINGS) && !(blw_la_abs(rise) <= ((SLOPE_LEFT * most) + noise));
+         h++) {
+        alpha = BLW_R(0.5) * (low + high);
+        rise  = slope(at, alpha, first + (alpha * bend));
+        if (rise <= BLW_R(0.0)) {
+            low = alpha;
+        } else {
+            high = alpha;
+        }
+    }
+    return alpha;
+}
+
+static void move(blw_l1_newton_t *at, blw_real_t alpha)
+{
+    blw_l1_t *const self = at->l1;
+    const size_t    N    = self->model->N;
+
+    blw_la_axpy(N, alpha, self->dz, self->tau);
+    blw_la_axpy(N, alpha, self->z, self->l);
+    blw_la_axpy(self->model->n, alpha - BLW_R(1.0), self->step, at->x);
+}
+
+/* The next kappa: nu_g = D l_g on groups inside, and l and x follow. */
+static void tighten(blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+
+    at->kappa *= KAPPA_RATIO;
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t     i       = m->first[g];
+        const bool       outside = blw_l1_outside(self, g, i);
+        const blw_real_t norm    = blw_la_max(blw_l1_norm(m, g, self->l), m->c[g]);
+        const blw_real_t D       = (at->kappa * self->A[g]) / norm;
+        for (size_t j = i; j < m->first[g + 1U]; j++) {
+            const blw_real_t nu = outside ? (at->zeta[j] - self->tau[j]) : (D * self->l[j]);
+            self->dz[j]         = (at->zeta[j] - nu) - self->tau[j];
+        }
+    }
+    blw_la_symv(m->N, m->S, self->dz, self->z);
+    blw_la_gemv(m->n, m->N, m->F, self->dz, self->step);
+    blw_la_axpy(m->n, BLW_R(1.0), self->step, at->x);
+    move(at, BLW_R(1.0));
+}
+
+/* Groups whose nu has turned round go inside.  @return their number. */
+static size_t take_back(const blw_l1_newton_t *at)
+{
+    const blw_l1_t *const       self  = at->l1;
+    const blw_l1_model_t *const m     = self->model;
+    size_t                      moved = 0U;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t i  = m->first[g];
+        blw_real_t   nu = BLW_R(0.0); /* along dir */
+        for (size_t j = i; j < m->first[g + 1U]; j++) {
+            nu += (at->zeta[j] - self->tau[j]) * self->dir[j];
+        }
+        if (!(nu >= BLW_R(0.0))) {
+            for (size_t j = i; j < m->first[g + 1U]; j++) {
+                self->tau[j] = at->zeta[j];
+                self->dir[j] = BLW_R(0.0);
+            }
+            moved++;
+        }
+    }
+    return moved;
+}
+
+/* Of the groups inside with |l_g| > c_g the worst goes outside.  @return their number. */
+static size_t let_out(const blw_l1_newton_t *at)
+{
+    const blw_l1_t *const       self  = at->l1;
+    const blw_l1_model_t *const m     = self->model;
+    blw_real_t                  most  = BLW_R(0.0);
+    size_t                      worst = m->n_groups;
+    size_t                      count = 0U;
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const blw_real_t norm = blw_l1_norm(m, g, self->l);
+        if (!(norm <= (m->c[g] + blw_l1_slack(m->c[g]))) && !blw_l1_outside(self, g, m->first[g])) {
+            count++;
+            if ((norm / m->c[g]) > most) {
+                most  = norm / m->c[g];
+                worst = g;
+            }
+        }
+    }
+    if (worst < m->n_groups) {
+        for (size_t j = m->first[worst]; j < m->first[worst + 1U]; j++) {
+            self->dir[j] = self->l[j] / (most * m->c[worst]);
+        }
+    }
+    return count;
+}
+
+/* |dx|; whether it is a small part of the standard deviations of x in *small. */
+static blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
+{
+    const blw_l1_model_t *const m  = at->l1->model;
+    const blw_real_t *const     dx = at->l1->step;
+
+    *small = true;
+    for (size_t j = 0U; j < m->n; j++) {
+        const blw_real_t P_jj = m->P[blw_la_packed_row(j) + j];
+        *small                = *small && ((dx[j] * dx[j]) <= (SMALL * SMALL * P_jj));
+    }
+    return blw_la_norm(m->n, dx);
+}
+
+/* Keep the point behind A, and go back to it. */
+static void keep(blw_l1_newton_t *at)
+{
+    const blw_l1_t *const       self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+    blw_real_t *const           kept = &self->A[m->n_groups];
+
+    blw_la_copy(m->N, self->tau, kept);
+    blw_la_copy(m->N, self->l, &kept[m->N]);
+    blw_la_copy(m->n, at->x, &kept[2U * (size_t)m->N]);
+}
+
+static void restore(blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+    const blw_real_t *const     kept = &self->A[m->n_groups];
+
+    blw_la_copy(m->N, kept, self->tau);
+    blw_la_copy(m->N, &kept[m->N], self->l);
+    blw_la_copy(m->n, &kept[2U * (size_t)m->N], at->x);
+}
+
+/* Steps with kappa = 0.  @return whether they end in a minimum. */
+static bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m     = at->l1->model;
+    const blw_real_t            kappa = at->kappa;
+    bool                        small = false;
+    size_t                      wrong = 0U;
+
+    at->kappa = BLW_R(0.0);
+    for (size_t k = 0U; (k < STEPS_FINAL) && !(small && (wrong == 0U)) && (wrong <= WRONG)
+                        && (info->iterations < m->max_iterations);
+         k++) {
+        blw_l1_newton_step(at);
+        info->iterations++;
+        info->bound = last_change(at, &small);
+        move(at, BLW_R(1.0));
+        wrong = take_back(at);
+        (void)aim(at, true);
+        wrong += let_out(at);
+    }
+    at->kappa = kappa;
+    return small && (wrong == 0U) && !at->weak;
+}
+
+/* Newton steps for one kappa, *quiet if no group has changed sides.  @return whether they settled. */
+static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
+{
+    bool       settled = false;
+    blw_real_t alpha   = BLW_R(1.0);
+
+    *quiet = true;
+    for (size_t k = 0U; (k < STEPS) && !settled && (alpha >= STUCK)
+                        && (info->iterations < at->l1->model->max_iterations);
+         k++) {
+        blw_l1_newton_step(at);
+        info->iterations++;
+        alpha = search(at);
+        move(at, alpha);
+        const bool stayed = (aim(at, false) == 0U);
+        *quiet            = *quiet && stayed;
+        settled = (stayed && (alpha >= BLW_R(1.0))) || (blw_l1_newton_residual(at) <= SETTLED);
+    }
+    return settled;
+}
+
+/* The point of the last kappa that settled; without one nu = 0. */
+static void fall_back(blw_l1_newton_t *at, bool any)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+
+    if (any) {
+        restore(at);
+    } else {
+        blw_la_copy(m->N, at->zeta, self->tau);
+        blw_la_gemv(m->n, m->N, m->F, self->tau, at->x);
+    }
+    blw_la_symv(m->N, m->S, self->tau, self->l);
+}
+
+/* Nothing clipped, widths of all groups; kappa such that a gross attack alone is outside. */
+static void start(blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+
+    at->kappa = KAPPA_FIRST;
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t i = m->first[g];
+        self->A[g]     = blw_la_sqrt(m->W[blw_la_packed_row(i) + i]);
+        at->kappa = blw_la_max(at->kappa, (KAPPA_GROSS * blw_l1_norm(m, g, self->l)) / self->A[g]);
+    }
+    blw_la_copy(m->N, at->zeta, self->tau);
+    blw_la_fill(m->N, BLW_R(0.0), self->dir);
+    blw_la_gemv(m->n, m->N, m->F, at->zeta, at->x);
+}
+
+static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
+{
+    const blw_l1_model_t *const m     = self->model;
+    blw_l1_newton_t             at    = {self, zeta, x, BLW_R(0.0), 0U, false};
+    bool                        any   = false; /* whether a kappa has settled */
+    bool                        quiet = true;
+
+    start(&at);
+    while (!info->converged && (info->iterations < m->max_iterations) && (at.kappa >= KAPPA_LAST)) {
+        const bool settled = descend(&at, info, &quiet);
+        const bool last    = (at.kappa * KAPPA_RATIO) < KAPPA_LAST;
+        if (settled) {
+            keep(&at);
+            any = true;
+        }
+        if (last || (settled && quiet)) {
+            info->converged = finish(&at, info);
+            if (!info->converged && any) {
+                restore(&at);
+                (void)aim(&at, false);
+            }
+        }
+        if (!info->converged) {
+            tighten(&at);
+        }
+    }
+    if (!info->converged) {
+        fall_back(&at, any);
+    }
+}
+
+static void multiply(blw_l1_t *self, const blw_real_t *zeta)
+{
+    blw_la_symv(self->model->N, self->model->S, zeta, self->l);
+}
+
+static bool fits(const blw_l1_model_t *m)
+{
+    return blw_l1_has_pairs(m) && (m->Z == NULL) && (m->S != NULL) && (m->W != NULL)
+           && (m->G != NULL) && (m->P != NULL);
+}
+
+const blw_l1_ops_t blw_l1_newton_ops = {
+    .fits     = fits,
+    .multiply = multiply,
+    .solve    = solve,
+};
