@@ -18,7 +18,8 @@ static bool pairs_ok(const blw_guard_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
 
-    return (model->pairs == 0U) || ((plant->p == 1U) && (model->n_units == plant->m));
+    return (model->pairs == 0U)
+           || ((plant->p >= 1U) && (plant->p <= 2U) && (model->n_units == plant->m));
 }
 
 /* Every unit has a number below n_units, no p units hold more than `most` sensors, every rank is

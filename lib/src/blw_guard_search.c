@@ -259,12 +259,35 @@ static blw_mask_t next_of_same_size(blw_mask_t units)
     return (ripple == 0U) ? 0U : (ripple | (((units ^ ripple) >> 2) / low));
 }
 
+/* (6) for two sensors with V and s: |l_j|^2 + g' (S_ii - S_ij S_ji)^-1 g, g = l_i - S_ij l_j. */
+static blw_real_t explained_by_two(const blw_guard_t *self, size_t i, size_t j)
+{
+    const size_t            r    = self->model->r;
+    const blw_real_t *const l_j  = &self->l[j * r];
+    blw_real_t *const       sent = self->turned;
+    blw_real_t *const       g    = &self->turned[r];
+    blw_real_t *const       y    = &self->turned[3U * r];
+
+    for (size_t a = 0U; a < r; a++) {
+        sent[a] = -l_j[a];
+        g[a]    = self->l[(i * r) + a];
+    }
+    blw_guard_couple(self->model, i, j, sent, g);
+    blw_guard_divide(self->model, i, j, g, &self->turned[2U * r], y);
+    return blw_la_dot(r, l_j, l_j) + blw_la_dot(r, g, y);
+}
+
 /* (6) for one set. */
 static blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
 {
-    const size_t r    = self->model->r;
+    const size_t     r  = self->model->r;
+    blw_real_t      *to = self->step;
+    blw_guard_some_t some;
+
+    if ((self->model->pairs != 0U) && blw_guard_list(self, set, &some) && (some.count == 2U)) {
+        return explained_by_two(self, some.at[0].sensor, some.at[1].sensor);
+    }
     const size_t rows = blw_guard_gather(self, set);
-    blw_real_t  *to   = self->step;
 
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
         if (guard_has(set, i)) {

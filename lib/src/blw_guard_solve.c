@@ -311,7 +311,6 @@ static void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descen
     const blw_real_t margin = AT_ONCE * self->model->k;
     bool             clear  = false;
     blw_mask_t       set    = blw_guard_choose(self, margin, &clear);
-
     if (!clear && !descent->fresh) {
         survey(self, descent);
         descent->fresh = true;
@@ -350,8 +349,8 @@ static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *de
     }
     *converged = descend(self, descent->decides ? limit : most, descent);
     if (descent->decides) {
-        set =
-            (descent->chosen != 0U) ? descent->chosen : blw_guard_choose(self, BLW_R(0.0), &clear);
+        set = descent->chosen;
+        set = (set != 0U) ? set : blw_guard_choose(self, BLW_R(0.0), &clear);
     }
     if ((set == 0U) && !*converged) {
         descent->decides = false;
@@ -377,8 +376,8 @@ static void start(blw_guard_t *self, descent_t *descent)
 blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
-    const bool                     search  = model->search != 0U;
     const unsigned                 most    = model->max_updates;
+    const bool                     search  = model->search != 0U;
     descent_t                      descent = {.decides = self->warm_up == 0U};
 
     start(self, &descent);

@@ -190,6 +190,28 @@ def test_library_given_two_colluding_sensors_finds_them(libraries):
     assert np.mean(found["excluded"][150:] == 0b100100) > 0.95
 
 
+@pytest.mark.parametrize("search", [0, 1, 2])
+def test_library_given_tables_for_two_sensors_does_as_without(libraries, monkeypatch, search):
+    plant, gains = colluding_plant()
+    generator = np.random.default_rng(91)
+    y = simulate(plant, 400, 92)[0]
+    for start in range(0, 400, 20):
+        liars = generator.choice(plant.m, 2, replace=False)
+        y[start : start + 20, liars] += 10.0 * generator.standard_normal((20, 2))
+    found = []
+    for numbers in (guard_order.PAIR_NUMBERS, 0):
+        monkeypatch.setattr(guard_order, "PAIR_NUMBERS", numbers)
+        designed = guard.design(plant, gains, guard.Options(max_updates=5000))
+        assert designed.tables.members["pairs"] == (1 if numbers else 0)
+        designed.tables.members["search"] = search
+        found.append(GuardLibrary(libraries["f64"], plant, gains, designed).run(y))
+    same = (found[0]["outcome"] != BOUND) & (found[1]["outcome"] != BOUND)
+    assert np.mean(same) > 0.9
+    assert np.array_equal(found[0]["excluded"][same], found[1]["excluded"][same])
+    error = np.abs(found[0]["x_hat"] - found[1]["x_hat"])[same] / np.sqrt(np.diag(gains.P))
+    assert error.max() < 1e-6
+
+
 def test_library_given_a_group_excludes_it_as_one(libraries):
     plant, gains = colluding_plant()
     data = {key: getattr(plant, key).tolist() for key in ("A", "C", "Q", "R")}

@@ -47,7 +47,7 @@ DRIFT_SIGMAS = 5.0
 #: work beside them weighs less; where several sensors are excluded jointly without tables; and
 #: where more than RARE_CLIPPING of the benign steps need some.
 UPDATES = 6
-UPDATE_TERMS = 72
+UPDATE_TERMS = 80
 MOST_UPDATES = 16
 UPDATES_IF_JOINT = 30
 UPDATES_IF_OFTEN = 200
@@ -213,7 +213,7 @@ def default_updates(model: Model, rows: int, pairs: bool, search: bool, recovery
     clips several sensors at once, where whole groups have to be left out, or where the noise is not
     white; and twice that where a second solution follows a search."""
     few = min(MOST_UPDATES, UPDATES + model.m * rows**2 // UPDATE_TERMS)
-    each = few if pairs else UPDATES_IF_JOINT
+    each = few * min(2, max(1, model.p)) if pairs else UPDATES_IF_JOINT
     if recovery < RARE_CLIPPING or model.groups or model.noise_margin > 0.0:
         each = UPDATES_IF_OFTEN
     return (2 if search else 1) * each * max(1, model.p)

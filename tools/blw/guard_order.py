@@ -15,7 +15,7 @@ Array = NDArray
 #: An order is suggested if tr P grows by no more than this.
 TOLERABLE = 0.01
 
-#: Largest size of the tables for one excluded sensor.
+#: Largest size of the tables for one or two excluded sensors.
 PAIR_NUMBERS = 16_000
 
 #: Largest number of rows for which all orders are computed.
@@ -83,10 +83,10 @@ def sees_all(bank: Filters) -> bool:
 
 
 def pair_reals(model: Model, r: int) -> int:
-    """Numbers in the tables for one excluded sensor, V and s.  None if units of several sensors, or
-    several of them, may be excluded, nor if they would be larger than PAIR_NUMBERS."""
+    """Numbers in the tables for one or two excluded sensors, V and s.  None if units of several
+    sensors, or more than two, may be excluded, nor if they would be larger than PAIR_NUMBERS."""
     numbers = model.m * (model.m - 1) * r * (r + 1)
-    wanted = model.p == 1 and len(model.units) == model.m and numbers <= PAIR_NUMBERS
+    wanted = model.p in (1, 2) and len(model.units) == model.m and numbers <= PAIR_NUMBERS
     return numbers if wanted else 0
 
 

@@ -67,7 +67,7 @@ typedef struct blw_guard_model {
                                         the p largest units at least, >= 1 */
     uint8_t           search;      /**< 1: search the sets of p units when exclusion fails, 2: and
                                         whenever a unit is excluded */
-    uint8_t           pairs;       /**< 1: V and s are there; needs p = 1 and n_units = m */
+    uint8_t           pairs;       /**< 1: V and s are there; needs p = 1 or 2 and n_units = m */
     uint16_t          max_updates; /**< bound on block updates in one step, >= 1; joint steps count
                                         as several (blw_guard_solve.c) */
     uint16_t          warm_up;     /**< steps after reset without exclusion */

@@ -119,18 +119,19 @@ def _bank(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
 
 def _guard(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
     """Filters, l = S e, fusion and averages; every update adds a block column of S and a look at
-    all sensors, a gross attack l = S tau up to three times, a search the factors of all sets."""
+    all sensors, a gross attack may need l = S tau once more, a search takes the factors of all
+    sets."""
     n, m, r, most = designed.mem
     tables = designed.tables.to_json()
     N, n_u, n_s = m * r, tables["n_u"], n - tables["n_u"]
     product = N * (N - r)
     split = n * n + n_s * N if n_s else 0
     typical = (_predict(plant) + m * n + len(tables["Lam"]) + len(tables["b"]) + product
-               + 2 * n_u * N + split + 3 * N)
+               + 2 * n_u * N + split + 4 * N)
     rows = most * r
     sets = comb(tables["n_units"], plant["p"]) if tables["search"] else 0
     updates = tables["max_updates"] * (N * r + 6 * N)
-    return typical, typical + updates + 3 * product + sets * (rows**3 // 6 + rows**2)
+    return typical, typical + updates + product + sets * (rows**3 // 6 + rows**2)
 
 
 #: Multiply-adds as the headers of the modules state them.

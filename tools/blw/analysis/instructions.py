@@ -31,7 +31,7 @@ BANK_LOOK = 21.4
 
 #: guard: a sensor, an operation of the straight-line code (registers that run out included), and a
 #: multiply-add of the loops.
-GUARD_SENSOR = 48
+GUARD_SENSOR = 62
 GUARD_OPERATION = 1.22
 GUARD_LOOP = 3.9
 
@@ -94,13 +94,14 @@ def _guard(designed: Designed, plant: dict[str, Any]) -> int:
     loops = {
         "advance": n * (n + plant["l"]) + m * n + len(tables["Lam"]) + len(tables["b"]),
         "multiply": N * (N - r),
-        "squares": N,
+        "squares": 2 * N,
         "average": 2 * N,
         "fuse": 2 * n_u * N + (n * n + n_s * N if n_s else 0),
     }
     straight = {part: designed.tables.members[part] for part in loops}
     done = {part: operations(code) for part, code in straight.items() if isinstance(code, Code)}
-    rest = sum(macs for part, macs in loops.items() if part not in done)
+    done["squares"] = 2 * done.get("squares", 0)  # of e and of l
+    rest = sum(macs for part, macs in loops.items() if not done.get(part))
     return round(GUARD_SENSOR * m + GUARD_OPERATION * sum(done.values()) + GUARD_LOOP * rest)
 
 
