@@ -100,8 +100,9 @@ static inline blw_real_t blw_l1_slack(blw_real_t c_i)
 bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta);
 
 /* From l outside A and nu on A, both in self->l, as the sweeps left them, to l, tau and x [n].
- * *bound = |last correction of x|.  @return whether they make a minimum. */
-bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound);
+ * *bound = |last correction of x|, *intact: T is as it was.  @return whether they make a minimum. */
+bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound,
+                   bool *intact);
 
 /* y = S x for S [N x N], packed. */
 static inline void blw_l1_symv(const blw_l1_model_t *m, const blw_real_t *S, const blw_real_t *x,

@@ -123,7 +123,8 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
     return small;
 }
 
-bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound,
+                   bool *intact)
 {
     bool settled = false;
 
@@ -132,5 +133,6 @@ bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_re
         predict(self, x);
         settled = correct(self, zeta, x, bound);
     }
+    *intact = settled; /* the factors take the place of T */
     return settled ? blw_l1_holds(self, zeta) : blw_l1_kkt(self, zeta, x, bound);
 }

@@ -275,6 +275,7 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
 {
     const blw_l1_model_t *const m       = self->model;
     bool                        dropped = false;
+    bool                        intact  = false; /* T is that of the present A */
 
     for (size_t i = 0U; i < m->N; i++) {
         assign(self, i, BLW_R(0.0));
@@ -282,11 +283,14 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
     }
     do {
         if (dropped) {
+            intact          = false;
             info->converged = blw_l1_kkt(self, zeta, x, &info->bound);
         } else {
-            rebuild(self);
+            if (!intact) {
+                rebuild(self);
+            }
             pivot(self, info);
-            info->converged = blw_l1_refine(self, zeta, x, &info->bound);
+            info->converged = blw_l1_refine(self, zeta, x, &info->bound, &intact);
         }
         if (!info->converged && (info->iterations < m->max_iterations)) {
             info->iterations++;
