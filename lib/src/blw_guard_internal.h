@@ -94,6 +94,10 @@ bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *s
  *  changed if the list is empty or that is more than the limit allows. */
 bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
                          unsigned limit);
+/** Move the sensors of a set so, or else, if they are too many or do not move, those of a smaller
+ *  set. */
+void blw_guard_move_together(blw_guard_t *self, blw_mask_t set, blw_mask_t smaller,
+                             blw_real_t close, unsigned limit);
 /** The sensors without nu_i that clip; suspicion is filled with all |l_i|^2. */
 blw_mask_t blw_guard_clipping(blw_guard_t *self);
 /** The step [r] of tau_i from l_i and tau_i to the minimum of (2) over nu_i and nu_j, where j is the one

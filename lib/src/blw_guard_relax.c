@@ -8,6 +8,7 @@
  * (blw_guard_beside.c), and two excluded ones are eliminated at once: with
  * S_ii - S_ij S_ji = V' diag(s) V,
  *     step_i = -V' diag(s)^-1 V (l_i - S_ij l_j),   step_j = -l_j - S_ji step_i.             (11) */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_guard_strips.h"
 #include "blw_la.h"
@@ -290,4 +291,15 @@ bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t t
         relax(self, some, tolerance, (more < MOST_SWEEPS) ? (more + 1U) : MOST_SWEEPS);
     self->updates = (uint16_t)(self->updates + least + ((swept - 1U) * count));
     return true;
+}
+
+BLW_APART void blw_guard_move_together(blw_guard_t *self, blw_mask_t set, blw_mask_t smaller,
+                                       blw_real_t close, unsigned limit)
+{
+    blw_guard_some_t some;
+
+    if (!blw_guard_list(self, set, &some) || !blw_guard_move_some(self, &some, close, limit)) {
+        (void)blw_guard_list(self, smaller, &some);
+        (void)blw_guard_move_some(self, &some, close, limit);
+    }
 }

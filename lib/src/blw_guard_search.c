@@ -2,6 +2,7 @@
 /* Several sensors at once: factors of S_II, Newton steps, and the search over all sets.
  *
  * Removing I lowers the least squares (2) without penalty by l_I' S_II^-1 l_I / 2.           (6) */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -119,7 +120,7 @@ static bool within_reach(const blw_guard_t *self, size_t i, const blw_real_t *st
 }
 
 /* The Newton step into self->step.  @return whether it is within reach. */
-static bool find_step(blw_guard_t *self, blw_mask_t set)
+static BLW_APART bool find_step(blw_guard_t *self, blw_mask_t set)
 {
     const size_t r    = self->model->r;
     const size_t m    = self->model->head.plant->m;

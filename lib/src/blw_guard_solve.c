@@ -7,6 +7,7 @@
  * tau is kept rather than nu: it stays at noise size however large the attack, and a sensor that
  * leaves the support gets tau_i = e_i exactly.  Where tau_i starts makes no difference to the minimum:
  * after a gross attack it starts from 0, and l = S tau holds no rounding of what was sent. */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -85,7 +86,7 @@ static void note_clipping(const blw_guard_t *self, descent_t *descent)
 }
 
 /* All |h_i|, and the largest step.  The step of an excluded sensor is -l_i. */
-static void survey(blw_guard_t *self, descent_t *descent)
+static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 {
     const blw_real_t k        = self->model->k;
     blw_real_t      *h        = self->h;
@@ -126,7 +127,7 @@ static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 }
 
 /* Try a Newton step on a set of sensors.  @return whether anything was done. */
-static bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
+static BLW_APART bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
 {
     const unsigned cost = self->updates + cost_of(self, set);
 
@@ -153,15 +154,28 @@ static void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_som
     }
 }
 
+/* Move those; fewer still if they do not move.  @return whether anything moved. */
+static BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent, blw_real_t close)
+{
+    const unsigned   limit = descent->limit - LOOK;
+    blw_guard_some_t some;
+
+    list_next(self, descent, &some);
+    if (blw_guard_move_some(self, &some, close, limit)) {
+        return true;
+    }
+    (void)blw_guard_list(self, self->excluded | guard_bit(descent->sensor), &some);
+    return blw_guard_move_some(self, &some, close, limit);
+}
+
 /* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
-static bool update(blw_guard_t *self, descent_t *descent)
+static BLW_APART bool update(blw_guard_t *self, descent_t *descent)
 {
     const blw_real_t k       = self->model->k;
     const blw_mask_t next    = guard_bit(descent->sensor);
     const blw_mask_t support = self->attacked | self->excluded;
     const bool       several = !blw_guard_exact(self, blw_mask_count(self->excluded));
     blw_real_t       close   = TOLERANCE * k;
-    blw_guard_some_t some;
 
     if ((self->updates + LOOK + ((self->excluded != 0U) ? 4U : 1U)) > descent->limit) {
         return false;
@@ -177,13 +191,8 @@ static bool update(blw_guard_t *self, descent_t *descent)
     if (descent->decides) {
         close = blw_la_max(close, COARSE * descent->largest);
     }
-    list_next(self, descent, &some);
-    bool moved = blw_guard_move_some(self, &some, close, descent->limit - LOOK);
-    if (!moved) {
-        (void)blw_guard_list(self, self->excluded | next, &some);
-        moved = blw_guard_move_some(self, &some, close, descent->limit - LOOK);
-    }
-    self->updates = (uint16_t)(self->updates + LOOK);
+    const bool moved = move_next(self, descent, close);
+    self->updates    = (uint16_t)(self->updates + LOOK);
     return moved;
 }
 
@@ -223,30 +232,22 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
 }
 
 /* l_I = 0 for the excluded sensors I, together with what else has nu_i /= 0. */
-static void eliminate(blw_guard_t *self, unsigned limit)
+static BLW_APART void eliminate(blw_guard_t *self, unsigned limit)
 {
-    const blw_real_t close = TOLERANCE * self->model->k;
-    blw_guard_some_t some;
-
     if (!blw_guard_exact(self, blw_mask_count(self->excluded))) {
         (void)blw_guard_newton(self, self->excluded);
         self->updates = (uint16_t)(self->updates + cost_of(self, self->excluded));
         return;
     }
-    if (!blw_guard_list(self, self->attacked | self->excluded, &some)
-        || !blw_guard_move_some(self, &some, close, limit)) {
-        (void)blw_guard_list(self, self->excluded, &some);
-        (void)blw_guard_move_some(self, &some, close, limit);
-    }
+    blw_guard_move_together(self, self->attacked | self->excluded, self->excluded,
+                            TOLERANCE * self->model->k, limit);
 }
 
 /* Solve for what clips beside the excluded sensors, if these stand out; for the one that clips most
  * if the limit allows no more. */
-static void move_clipping(blw_guard_t *self, unsigned limit)
+static BLW_APART void move_clipping(blw_guard_t *self, unsigned limit)
 {
-    const blw_real_t close = TOLERANCE * self->model->k;
-    const blw_mask_t more  = blw_guard_clipping(self);
-    blw_guard_some_t some;
+    const blw_mask_t more = blw_guard_clipping(self);
     size_t           most = 0U;
     size_t           i    = 0U;
 
@@ -263,11 +264,8 @@ static void move_clipping(blw_guard_t *self, unsigned limit)
     if (!blw_guard_stands_out(self, self->excluded, AT_ONCE * self->model->k)) {
         return;
     }
-    if (!blw_guard_list(self, self->attacked | self->excluded | more, &some)
-        || !blw_guard_move_some(self, &some, close, limit)) {
-        (void)blw_guard_list(self, self->excluded | guard_bit(most), &some);
-        (void)blw_guard_move_some(self, &some, close, limit);
-    }
+    blw_guard_move_together(self, self->attacked | self->excluded | more,
+                            self->excluded | guard_bit(most), TOLERANCE * self->model->k, limit);
 }
 
 /* Updates that eliminate() takes at least. */
@@ -306,7 +304,7 @@ static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, d
 
 /* Exclude what stands out, and see whether it still does; else leave the choice to the first descent,
  * which may start from anywhere. */
-static void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descent)
+static BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descent)
 {
     const blw_real_t margin = AT_ONCE * self->model->k;
     bool             clear  = false;
@@ -334,8 +332,8 @@ static void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descen
 }
 
 /* The first descent, and what it excludes.  @return that set. */
-static blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *descent,
-                                bool *converged)
+static BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *descent,
+                                          bool *converged)
 {
     const unsigned most  = self->model->max_updates;
     blw_mask_t     set   = 0U;

@@ -38,6 +38,13 @@ def test_deepest_given_recursion_fails_by_name():
         made.deepest("root")
 
 
+def test_forget_given_a_routine_that_is_not_linked_leaves_the_others():
+    made = graph({"root": 8, "a": 16}, {"root": ["a", "__aeabi_idiv"]})
+    assert made.named() == {"__aeabi_idiv"}
+    made.forget(made.named())
+    assert made.deepest("root") == 8 + 16
+
+
 def test_deepest_given_a_function_without_a_frame_fails_by_name():
     with pytest.raises(StepFailed, match="the stack of other is not known"):
         graph({"root": 8}, {"root": ["other"]}).deepest("root")

@@ -11,6 +11,7 @@ unknown size are errors, not guesses.
 
 import re
 import subprocess
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,6 +38,17 @@ class CallGraph:
 
     frames: dict[str, int] = field(default_factory=dict)
     calls: dict[str, set[str]] = field(default_factory=dict)
+
+    def named(self) -> set[str]:
+        """Everything that is called, and has no frame."""
+        return set().union(*self.calls.values()) - self.frames.keys()
+
+    def forget(self, names: Iterable[str]) -> None:
+        """Nobody calls these: gcc lists all routines of its library that an operation may need, the
+        linker keeps those that are called."""
+        gone = set(names)
+        for callees in self.calls.values():
+            callees -= gone
 
     def deepest(self, root: str, path: tuple[str, ...] = ()) -> int:
         """Bytes of the deepest path from root.  Raises StepFailed if no bound is known."""
@@ -68,6 +80,7 @@ def stack_bytes(program: Program, owner: str) -> int:
     graph.calls[_POINTER] = {name for name in kernels if name.rpartition(":")[2] in linked}
     graph.calls[_POINTER] |= _offered(program, symbols, library, f"blw_{owner}_ops")
     _add_library(graph, _said(program, "objdump", "-d"), symbols)
+    graph.forget(name for name in graph.named() if name not in linked)
     return max(graph.deepest(f"blw_{owner}_{verb}") for verb in ("init", "reset", "step"))
 
 
