@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Newton engine for (2) in blw_l1.h, groups of one row or two, by continuation [Madsen, Nielsen,
- * "A finite smoothing algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)].  |nu_g| is
- * rounded off below w = kappa width_g, width_g = the benign standard deviation of zeta_g:
+ * "A finite smoothing algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)].
+ * |nu_g| is rounded off below w = kappa width_g, width_g = the benign standard deviation of zeta_g:
  *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|.                                (1)
- * The objective is then smooth, l_g = c_g nu_g / max(|nu_g|, w), and a group is either inside, where this
- * is linear, or outside, where only a pair can still turn.  A Newton step solves the optimality
- * conditions for the present groups inside and outside (blw_l1_newton_step.c); a search along it keeps
- * the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no group has
- * changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
+ * The objective is then smooth, l_g = c_g nu_g / max(|nu_g|, w), and a group is either inside, where
+ * this is linear, or outside, where only a pair can still turn.  A Newton step solves the optimality
+ * conditions for the present groups inside and outside (blw_l1_newton_step.c); a search along it
+ * keeps the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no group
+ * has changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
  * Few rows are inside in the end, often hardly more than n, so that a step is cheap. */
 #include "blw_l1_newton.h"
 
@@ -30,8 +30,8 @@
 /* Residual |l_g - c_g nu_g / max(|nu_g|, w)| / c_g that is good enough to go on. */
 #define SETTLED BLW_R(0.1)
 
-/* Search: most halvings, slope at the end of a whole step that is let pass, and of a shorter one, as
- * parts of the first slope. */
+/* Search: most halvings, slope at the end of a whole step that is let pass, and of a shorter one,
+ * as parts of the first slope. */
 #define HALVINGS    30U
 #define SLOPE_WHOLE BLW_R(0.5)
 #define SLOPE_LEFT  BLW_R(0.25)
@@ -75,19 +75,15 @@ static blw_real_t slope(const blw_l1_newton_t *at, blw_real_t alpha, blw_real_t 
     blw_real_t                  sum  = quadratic;
 
     for (size_t g = 0U; g < m->n_groups; g++) {
-        const size_t            i = m->first[g];
-        const blw_real_t *const d = &self->dz[i];
-        blw_real_t              nu[2];
-        blw_real_t              rate;
-        blw_real_t              norm = blw_l1_nu(at, g, nu);
-        nu[0] -= alpha * d[0];
+        const size_t            i    = m->first[g];
+        const blw_real_t *const d    = &self->dz[i];
+        const blw_real_t        v    = (at->zeta[i] - self->tau[i]) - (alpha * d[0]);
+        blw_real_t              rate = v * d[0];
+        blw_real_t              norm = blw_la_abs(v);
         if (blw_l1_size(m, g) == 2U) {
-            nu[1] -= alpha * d[1];
-            rate = (nu[0] * d[0]) + (nu[1] * d[1]);
-            norm = blw_la_norm(2U, nu);
-        } else {
-            rate = nu[0] * d[0];
-            norm = blw_la_abs(nu[0]);
+            const blw_real_t u = (at->zeta[i + 1U] - self->tau[i + 1U]) - (alpha * d[1]);
+            rate += u * d[1];
+            norm = blw_la_sqrt((v * v) + (u * u));
         }
         sum -= (m->c[g] * rate) / blw_la_max(norm, at->kappa * self->A[g]);
     }
@@ -281,7 +277,8 @@ static bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
     return small && (wrong == 0U) && !at->weak;
 }
 
-/* Newton steps for one kappa, *quiet if no group has changed sides.  @return whether they settled. */
+/* Newton steps for one kappa, *quiet if no group has changed sides.
+ * @return whether they settled. */
 static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
 {
     bool       settled = false;

@@ -28,8 +28,8 @@ blw_real_t blw_l1_nu(const blw_l1_newton_t *at, size_t g, blw_real_t nu[2]);
 /* Largest residual of the smoothed problem, relative to c_g. */
 blw_real_t blw_l1_newton_residual(const blw_l1_newton_t *at);
 
-/* Newton step for the groups in dir: x moves; self->z = change of l, self->dz = change of tau, and the
- * first n numbers of self->step = change of x. */
+/* Newton step for the groups in dir: x moves; self->z = change of l, self->dz = change of tau, and
+ * the first n numbers of self->step = change of x. */
 void blw_l1_newton_step(blw_l1_newton_t *at);
 
 #endif

@@ -2,10 +2,10 @@
 /* The linear system of blw_l1_newton.c.  Unknown are l on the groups inside, one number t per pair
  * outside, which turns it, l_g = c_g dir_g + t p_g, p_g = dir_g turned by 90 degrees, and x:
  *     [ E' W E + D   E' G ] [ l_E ]   [ E' (zeta - W l_0) ]
- *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],   l = l_0 + E l_E,  tau = W l + G x.   (1)
- * D = kappa width_g / c_g inside, |nu_g| / c_g for a pair outside; l_0 = c dir outside.  The system is
- * solved for the change from the present point, so that rounding errors do not stay.  R, a small part
- * of the information on x, holds x where E' G leaves it open; it only damps the change.
+ *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],  l = l_0 + E l_E,  tau = W l + G x. (1)
+ * D = kappa width_g / c_g inside, |nu_g| / c_g for a pair outside; l_0 = c dir outside.  The system
+ * is solved for the change from the present point, so that rounding errors do not stay.  R, a small
+ * part of the information on x, holds x where E' G leaves it open; it only damps the change.
  * The matrix is factored as L J L', J = diag(I, -I). */
 #include "blw_l1_newton.h"
 

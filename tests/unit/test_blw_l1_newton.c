@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /* The engine for groups of two rows on three sensors that see a pair and a real state alike:
- * W = I, G = (I I I)', S = I - G G' / 3, c = 1.  That is Huber's estimate of a location, in the plane
- * for the pair and on a line for the rest: sum_i clip(zeta_i - x) = 0, clip(v) = v / max(1, |v|). */
+ * W = I, G = (I I I)', S = I - G G' / 3, c = 1.  That is Huber's estimate of a location, in the
+ * plane for the pair and on a line for the rest: sum_i clip(zeta_i - x) = 0, clip(v) =
+ * v / max(1, |v|). */
 #include "support.h"
 
 #include "blw/blw_l1.h"
@@ -145,7 +146,7 @@ static void test_solve_given_too_few_steps_says_so_with_a_bound(void)
     }
 }
 
-/* Two of the real rows have the same noise: W has no inverse, and what it says of them is rounding. */
+/* Two of the real rows have the same noise: W has no inverse, what it says of them is rounding. */
 static void test_solve_given_a_singular_W_does_not_certify(void)
 {
     const blw_real_t zeta[N] = {BLW_R(0.0), BLW_R(0.0),  BLW_R(4.0),  BLW_R(0.0), BLW_R(0.0),
