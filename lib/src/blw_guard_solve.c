@@ -118,12 +118,13 @@ static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 /* Block updates that a joint step on some sensors counts as: its spreads, and its factorisation. */
 static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 {
+    const unsigned m       = self->model->head.plant->m;
     const unsigned sensors = blw_mask_count(set);
-    const unsigned rate    = 6U * self->model->head.plant->m;
 
-    return (sensors <= 1U)
-               ? 1U
-               : ((2U * (sensors + 1U)) + ((sensors * sensors * sensors * self->model->r) / rate));
+    if ((sensors <= 1U) || (sensors > m)) { /* more than m cannot be: it tells that m is not 0 */
+        return 1U;
+    }
+    return (2U * (sensors + 1U)) + ((sensors * sensors * sensors * self->model->r) / (6U * m));
 }
 
 /* Try a Newton step on a set of sensors.  @return whether anything was done. */

@@ -58,7 +58,7 @@ static size_t aim(const blw_l1_newton_t *at, bool keep)
         const bool       before = blw_l1_outside(self, g, i);
         blw_real_t       nu[2];
         const blw_real_t norm    = blw_l1_nu(at, g, nu);
-        const bool       outside = keep ? before : (norm > (at->kappa * self->A[g]));
+        const bool       outside = (keep && before) || (!keep && (norm > (at->kappa * self->A[g])));
         for (size_t j = i; (j < m->first[g + 1U]) && !(keep && (norm <= BLW_R(0.0))); j++) {
             self->dir[j] = outside ? (nu[j - i] / norm) : BLW_R(0.0);
         }
@@ -334,10 +334,11 @@ static void start(blw_l1_newton_t *at)
 static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m     = self->model;
-    blw_l1_newton_t             at    = {self, zeta, x, BLW_R(0.0), 0U, false};
+    blw_l1_newton_t             at    = {.l1 = self, .zeta = zeta};
     bool                        any   = false; /* whether a kappa has settled */
     bool                        quiet = true;
 
+    at.x = x;
     start(&at);
     while (!info->converged && (info->iterations < m->max_iterations) && (at.kappa >= KAPPA_LAST)) {
         const bool settled = descend(&at, info, &quiet);
