@@ -55,6 +55,8 @@ void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *ou
 void blw_l1_multipliers(blw_l1_t *self);
 /* z = Z' zeta, l = Z z: .multiply of the engines on Z. */
 void blw_l1_multiply_Z(blw_l1_t *self, const blw_real_t *zeta);
+/* Objective (2) at tau, with l = S tau. */
+blw_real_t blw_l1_objective(const blw_l1_t *self, const blw_real_t *zeta);
 /* max_g |l_g| / c_g over all groups. */
 blw_real_t blw_l1_statistic(const blw_l1_t *self);
 /* The group outside A that violates |l_g| <= c_g most, by more than widen times the slack, or

@@ -90,18 +90,6 @@ static blw_real_t slope(const blw_l1_newton_t *at, blw_real_t alpha, blw_real_t 
     return sum;
 }
 
-/* Objective (2) at tau, with l = S tau. */
-static blw_real_t objective(const blw_l1_t *self, const blw_real_t *zeta)
-{
-    const blw_l1_model_t *const m   = self->model;
-    blw_real_t                  sum = BLW_R(0.5) * blw_la_dot(m->N, self->tau, self->l);
-
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        sum += m->c[g] * blw_l1_nu_norm(self, zeta, g);
-    }
-    return sum;
-}
-
 /* Share of the step that does not pass the minimum along it by far. */
 static blw_real_t search(const blw_l1_newton_t *at)
 {
@@ -109,7 +97,7 @@ static blw_real_t search(const blw_l1_newton_t *at)
     const size_t          N     = self->model->N;
     const blw_real_t      first = blw_la_dot(N, self->dz, self->l);
     const blw_real_t      bend  = blw_la_dot(N, self->dz, self->z);
-    const blw_real_t      noise = NOISE * objective(self, at->zeta);
+    const blw_real_t      noise = NOISE * blw_l1_objective(self, at->zeta);
     const blw_real_t      most  = blw_la_abs(slope(at, BLW_R(0.0), first));
     blw_real_t            low   = BLW_R(0.0);
     blw_real_t            high  = BLW_R(1.0);

@@ -143,6 +143,15 @@ def test_design_given_auto_takes_the_active_set_with_its_bound(name, engine, bou
     assert fused["M"] is None and fused["rho"] == 0.0
 
 
+def test_design_given_pairs_and_a_coarse_W_pivots_on_Z(monkeypatch):
+    monkeypatch.setattr(lasso, "NEWTON_COND", 1.0)
+    *_, designed = design("complex", gamma=1.0)
+    fused = designed.tables.to_json()["l1"]
+    assert fused["engine"] == l1.ACTIVE_SET.name
+    assert fused["max_iterations"] == 8 * fused["N"]
+    assert fused["W"] is None and fused["Z"] is not None
+
+
 def test_design_given_max_iterations_keeps_it():
     *_, designed = design("paper0", gamma=1.0, max_iterations=7)
     assert designed.tables.to_json()["l1"]["max_iterations"] == 7

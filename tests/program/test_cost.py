@@ -13,6 +13,8 @@ from blw.cost.programs import Program, build
 from blw.cost.targets import TARGETS
 
 SETTLED = cases.SETTLING_STEPS + cases.BENIGN_STEPS
+#: Largest error of the flash that `analyze` states for the tables.
+FLASH_ERROR = 0.02
 KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
         "instructions_worst", "cycles_typical", "flash_bytes", "ram_bytes", "stack_bytes"}
 
@@ -80,7 +82,8 @@ def test_footprint_given_every_method_is_what_the_linker_kept(name):
     for program in linked:
         designed = prepared.design.methods[program.method]
         computed = footprint(program.method, designed, prepared.design.plant)
-        assert sizes.table_bytes(program) == computed.flash_bytes, program.method
+        flash = pytest.approx(computed.flash_bytes, rel=FLASH_ERROR)  # jump tables of the kernels
+        assert sizes.table_bytes(program) == flash, program.method
         assert sizes.ram_bytes(program) == computed.ram_bytes, program.method
 
 

@@ -34,6 +34,12 @@ DEFAULT_BENIGN_LOSS = 0.1
 
 #: Bound on the Newton steps of one solve: those that converge need about 20, whatever the model.
 NEWTON_STEPS = 64
+#: They work with W: above this cond(W) float32 is better served by pivots on Z.
+NEWTON_COND = 1e10
+
+#: Bound on the pivots of one solve, for each row of zeta.
+PIVOTS = 4
+PIVOTS_IF_PAIRED = 8
 
 #: Passes per row that the device keeps back from ADMM for the exact solve on the support.
 SUPPORT_RESERVE = 2
@@ -83,7 +89,8 @@ def assemble(
     reduced_form, groups = fusion.reduced, fusion.groups
     gamma, figures = choose_gamma(fusion, model, float(np.trace(kalman.P)), options)
     problem = admm_tuning.Problem(reduced_form, groups, fusion.F, gamma, fusion.response)
-    engine, engine_figures = choose_engine(problem, kalman, options)
+    newton = fusion.P is None and filters.cond_W <= NEWTON_COND
+    engine, engine_figures = choose_engine(problem, kalman, options, newton)
     P = None if fusion.P is None else table(fusion.P, "[m][r x r] to canonical coordinates")
     tables = Struct(
         "blw_lasso_model_t",
@@ -169,14 +176,22 @@ def choose_gamma(
 
 
 def choose_engine(
-    problem: admm_tuning.Problem, kalman: Kalman, options: Any
+    problem: admm_tuning.Problem, kalman: Kalman, options: Any, newton: bool
 ) -> tuple[l1.Engine, dict[str, Any]]:
-    """Engine and its bound on work; only `admm` is tuned, and only on request."""
+    """Engine and its bound on work; only `admm` is tuned, and only on request.
+
+    Where a local state may be a complex pair, `newton` prefers Newton steps on all groups at once.
+    In canonical coordinates few groups are ever attacked, so that pivots are fewer and cheaper.
+    """
     N, d = problem.reduced.Z.shape
     paired = problem.groups.count < N
     if options.engine != "admm":
-        bound = options.max_iterations or (NEWTON_STEPS if paired else 4 * N)
-        link = l1.NEWTON if paired else l1.TABLEAU
+        link, bound = l1.TABLEAU, PIVOTS * N
+        if paired:
+            link, bound = l1.ACTIVE_SET, PIVOTS_IF_PAIRED * N
+        if paired and newton and options.engine == "auto":
+            link, bound = l1.NEWTON, NEWTON_STEPS
+        bound = options.max_iterations or bound
         return l1.Engine(link, bound), {
             "engine": "active_set",
             "max_iterations": bound,
