@@ -4,7 +4,7 @@
 #include "support.h"
 
 #include "blw/blw_l1.h"
-#include "blw_la.h"
+#include "blw_l1_internal.h"
 
 /* (S + rho I)^-1 for S = I - 1 1'/3, rho = 1/2: 2/3 I + 4/9 1 1', packed lower. */
 static const blw_real_t M_half[6] = {
@@ -195,6 +195,50 @@ static void test_check_given_no_model_refuses(void)
     TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, blw_l1_check(NULL, &walk));
 }
 
+/* Engines that give up with what rounding might leave: x far off at no less a cost, and NaN. */
+static blw_real_t left_behind;
+
+static void give_up(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw_l1_info_t *told)
+{
+    blw_la_copy(self->model->N, zeta, self->tau);
+    self->tau[2]     = left_behind;
+    x_hat[0]         = left_behind;
+    told->iterations = 7U;
+}
+
+static void give_up_with(blw_real_t tau)
+{
+    const blw_l1_ops_t engine  = {.fits     = blw_l1_active_set_ops.fits,
+                                  .multiply = blw_l1_active_set_ops.multiply,
+                                  .solve    = give_up};
+    const blw_real_t   zeta[3] = {BLW_R(4.0), BLW_R(5.0), BLW_R(90.0)};
+
+    left_behind    = tau;
+    made.l1.engine = &engine;
+    blw_l1_solve(&l1, zeta, x, &info);
+    made.l1.engine = &blw_l1_active_set_ops;
+    TEST_ASSERT_FALSE(info.converged);
+    TEST_ASSERT_EQUAL_UINT16(7U, info.iterations);
+    TEST_ASSERT_TRUE(info.bound >= BLW_R(0.0));
+}
+
+static void test_solve_given_an_engine_led_astray_returns_the_linear_fusion(void)
+{
+    const blw_real_t astray[3] = {BLW_R(1e6), BLW_R(-1e6), support_nan};
+
+    for (size_t i = 0U; i < 3U; i++) {
+        give_up_with(astray[i]);
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 16.5, x[0]); /* mean 33 */
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 90.0, l1.tau[2]);
+    }
+}
+
+static void test_solve_given_an_engine_cut_short_keeps_what_is_better(void)
+{
+    give_up_with(BLW_R(6.0)); /* 84 + 1 instead of 1/2 |z|^2 = 2437 */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.5, x[0]);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -209,5 +253,7 @@ int main(void)
     RUN_TEST(test_check_given_a_sound_model_accepts_both_engines);
     RUN_TEST(test_check_given_each_fault_refuses);
     RUN_TEST(test_check_given_no_model_refuses);
+    RUN_TEST(test_solve_given_an_engine_led_astray_returns_the_linear_fusion);
+    RUN_TEST(test_solve_given_an_engine_cut_short_keeps_what_is_better);
     return UNITY_END();
 }
