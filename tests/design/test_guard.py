@@ -22,7 +22,7 @@ from guard_plants import (
     trace_without,
 )
 
-from blw import guard, guard_filters, guard_fusion, guard_order, model
+from blw import guard, guard_filters, guard_fusion, guard_order, kalman, model
 from blw.errors import DesignError, ModelError
 
 GOLDEN = [("paper0", "3"), ("paper0", "2"), ("complex", "3"), ("complex", "2"),
@@ -188,6 +188,25 @@ def test_library_given_two_colluding_sensors_finds_them(libraries):
     found = GuardLibrary(libraries["f32"], plant, gains, designed).run(y, u)
     assert mean_square(found, x, 150) <= 1.6 * np.trace(gains.P)
     assert np.mean(found["excluded"][150:] == 0b100100) > 0.95
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_library_given_two_ramps_leaves_both_sensors_out(libraries, seed):
+    C = np.random.default_rng(seed).standard_normal((7, 3))
+    A = np.diag([0.3, 0.645, 0.99])
+    data = {"A": A.tolist(), "C": C.tolist(), "Q": [0.3] * 3, "R": [0.2] * 7}
+    plant = model.parse({"name": "two", "dt_s": 0.1, "plant": data, "attack": {"p": 2}}, "two")
+    gains = kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
+    designed = guard.design(plant, gains, guard.Options())
+    assert max(designed.info["ratio"]) < 0.8  # the penalty alone is secure, given time
+    y, u, x = simulate(plant, 400, seed + 50)
+    ramp = np.linspace(0.0, 200.0, 300) * np.sqrt(0.2)
+    y[100:, 0] += ramp
+    y[100:, 2] -= ramp
+    found = GuardLibrary(libraries["f32"], plant, gains, designed).run(y, u)
+    assert np.mean(found["outcome"] == BOUND) < 0.01
+    assert np.all(found["excluded"][250:] == 0b101)
+    assert mean_square(found, x, 100) <= 1.6 * trace_without(plant, [0, 2])
 
 
 @pytest.mark.parametrize("search", [0, 1, 2])

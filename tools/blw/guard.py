@@ -201,11 +201,12 @@ def unit_numbers(model: Model) -> list[int]:
 
 
 def needs_search(model: Model, ratios: Array, rows: int) -> bool:
-    """Whether a convex penalty alone may be led astray, and a search is affordable."""
+    """Whether a convex penalty alone may be led astray, or kept from its end by several liars, and
+    a search is affordable."""
     sets = comb(len(model.units), model.p)
     affordable = sets * (rows**3 / 6 + rows**2) <= SEARCH_LIMIT
     misled = ratios.max() >= 1.0 - 1e-3 or model.noise_margin > 0.0
-    return bool(model.p > 0 and misled and affordable and (model.p > 1 or model.groups))
+    return bool(affordable and (model.p > 1 or (model.p > 0 and model.groups and misled)))
 
 
 def default_updates(model: Model, rows: int, pairs: bool, search: bool, recovery: float) -> int:
