@@ -143,12 +143,13 @@ def test_design_given_auto_takes_the_active_set_with_its_bound(name, engine, bou
     assert fused["M"] is None and fused["rho"] == 0.0
 
 
-def test_design_given_pairs_and_a_coarse_W_pivots_on_Z(monkeypatch):
-    monkeypatch.setattr(lasso, "NEWTON_COND", 1.0)
-    *_, designed = design("complex", gamma=1.0)
+@pytest.mark.parametrize("name, pivots", [("paper0", 4), ("complex", 8)])
+def test_design_given_a_coarse_W_pivots_on_Z(monkeypatch, name, pivots):
+    monkeypatch.setattr(lasso, "COND_COARSE", 1.0)
+    *_, designed = design(name, gamma=1.0)
     fused = designed.tables.to_json()["l1"]
     assert fused["engine"] == l1.ACTIVE_SET.name
-    assert fused["max_iterations"] == 8 * fused["N"]
+    assert fused["max_iterations"] == pivots * fused["N"]
     assert fused["W"] is None and fused["Z"] is not None
 
 

@@ -34,8 +34,8 @@ DEFAULT_BENIGN_LOSS = 0.1
 
 #: Bound on the Newton steps of one solve: those that converge need about 20, whatever the model.
 NEWTON_STEPS = 64
-#: They work with W: above this cond(W) float32 is better served by pivots on Z.
-NEWTON_COND = 1e10
+#: They and the tableau work with W: above this cond(W) float32 is better served by pivots on Z.
+COND_COARSE = 1e10
 
 #: Bound on the pivots of one solve, for each row of zeta.
 PIVOTS = 4
@@ -89,8 +89,8 @@ def assemble(
     reduced_form, groups = fusion.reduced, fusion.groups
     gamma, figures = choose_gamma(fusion, model, float(np.trace(kalman.P)), options)
     problem = admm_tuning.Problem(reduced_form, groups, fusion.F, gamma, fusion.response)
-    newton = fusion.P is None and filters.cond_W <= NEWTON_COND
-    engine, engine_figures = choose_engine(problem, kalman, options, newton)
+    link = choose_link(problem, fusion.P is not None, filters.cond_W)
+    engine, engine_figures = choose_engine(problem, kalman, options, link)
     P = None if fusion.P is None else table(fusion.P, "[m][r x r] to canonical coordinates")
     tables = Struct(
         "blw_lasso_model_t",
@@ -175,23 +175,27 @@ def choose_gamma(
     return gamma, figures
 
 
-def choose_engine(
-    problem: admm_tuning.Problem, kalman: Kalman, options: Any, newton: bool
-) -> tuple[l1.Engine, dict[str, Any]]:
-    """Engine and its bound on work; only `admm` is tuned, and only on request.
+def choose_link(problem: admm_tuning.Problem, canonical: bool, cond_W: float) -> l1.Link:
+    """The active set for a problem: pivots on the tableau, or Newton steps on all groups at once
+    where a local state may be a complex pair.
 
-    Where a local state may be a complex pair, `newton` prefers Newton steps on all groups at once.
-    In canonical coordinates few groups are ever attacked, so that pivots are fewer and cheaper.
+    In canonical coordinates few groups are ever attacked: there, pivots on Z are fewer and cheaper
+    than Newton steps.
     """
+    paired = problem.groups.count < problem.reduced.Z.shape[0]
+    if cond_W > COND_COARSE or (paired and canonical):
+        return l1.ACTIVE_SET
+    return l1.NEWTON if paired else l1.TABLEAU
+
+
+def choose_engine(
+    problem: admm_tuning.Problem, kalman: Kalman, options: Any, link: l1.Link
+) -> tuple[l1.Engine, dict[str, Any]]:
+    """Engine and its bound on work; only `admm` is tuned, and only on request."""
     N, d = problem.reduced.Z.shape
-    paired = problem.groups.count < N
     if options.engine != "admm":
-        link, bound = l1.TABLEAU, PIVOTS * N
-        if paired:
-            link, bound = l1.ACTIVE_SET, PIVOTS_IF_PAIRED * N
-        if paired and newton and options.engine == "auto":
-            link, bound = l1.NEWTON, NEWTON_STEPS
-        bound = options.max_iterations or bound
+        pivots = PIVOTS_IF_PAIRED if problem.groups.count < N else PIVOTS
+        bound = options.max_iterations or (NEWTON_STEPS if link is l1.NEWTON else pivots * N)
         return l1.Engine(link, bound), {
             "engine": "active_set",
             "max_iterations": bound,
