@@ -65,40 +65,26 @@ static blw_real_t square_with(blw_guard_t *self, blw_mask_t set, size_t i)
 
 blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
 {
-    blw_mask_t rest    = set;
-    blw_real_t largest = BLW_R(0.0);
-    blw_real_t all     = BLW_R(0.0);
+    const size_t r       = self->model->r;
+    blw_mask_t   rest    = set;
+    blw_real_t   largest = BLW_R(0.0);
+    blw_real_t   all     = BLW_R(0.0);
 
     blw_guard_start_without(self, set);
     blw_guard_squares(self->model, self->l, self->h);
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        blw_real_t square = self->h[i];
+        const size_t row    = i * r;
+        blw_real_t   square = self->h[i];
 
         self->h[i] = blw_la_sqrt(square);
         if ((rest & 1U) != 0U) {
-            self->h[i] = blw_guard_pull(self, i, self->step);
-            square     = square_with(self, set, i);
+            self->h[i] =
+                blw_guard_pull(r, &self->l[row], &self->e[row], &self->eta[row], self->step);
+            square = square_with(self, set, i);
         }
         all += square;
         largest = blw_la_max(largest, square);
         rest >>= 1;
     }
     return (all <= BLW_REAL_MAX) ? largest : all;
-}
-
-blw_real_t blw_guard_pull(const blw_guard_t *self, size_t i, blw_real_t *h)
-{
-    const size_t            r   = self->model->r;
-    const blw_real_t *const l   = &self->l[i * r];
-    const blw_real_t *const e   = &self->e[i * r];
-    const blw_real_t *const tau = &self->eta[i * r];
-    blw_real_t              sum = BLW_R(0.0);
-
-    for (size_t a = 0U; a < r; a++) {
-        const blw_real_t value = l[a] + (e[a] - tau[a]);
-
-        h[a] = value;
-        sum += value * value;
-    }
-    return blw_la_sqrt(sum);
 }

@@ -56,8 +56,12 @@ void blw_guard_start_without(blw_guard_t *self, blw_mask_t set);
 /** blw_guard_start_without() and all |h_i| there.  @return the largest of the |l_i|^2 there and, for the
  *  sensors of the set, at nu = 0. */
 blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set);
-/** h_i = l_i + nu_i [r] of sensor i.  @return |h_i| */
-blw_real_t blw_guard_pull(const blw_guard_t *self, size_t i, blw_real_t *h);
+/** h_i = l_i + (e_i - tau_i) of a sensor, all [r].  @return |h_i| */
+blw_real_t blw_guard_pull(size_t r, const blw_real_t *l, const blw_real_t *e, const blw_real_t *tau,
+                          blw_real_t *h);
+/** The step (7) of blw_guard_solve.c of a sensor with k_i = k, all [r].  @return |h_i| */
+blw_real_t blw_guard_step_alone(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
+                                const blw_real_t *tau, blw_real_t *step);
 
 /** Solve (2) from e [N] and l = S e, or from tau and l as blw_guard_start_without() leaves them, and
  *  the |h_i| there; tau is left in self->eta.  Fills h, attacked, excluded.

@@ -16,6 +16,30 @@
 /* Sweeps over some sensors at most before all are looked at again. */
 #define MOST_SWEEPS 8U
 
+blw_real_t blw_guard_pull(size_t r, const blw_real_t *l, const blw_real_t *e, const blw_real_t *tau,
+                          blw_real_t *h)
+{
+    blw_real_t sum = BLW_R(0.0);
+
+    for (size_t a = 0U; a < r; a++) {
+        h[a] = l[a] + (e[a] - tau[a]);
+        sum += h[a] * h[a];
+    }
+    return blw_la_sqrt(sum);
+}
+
+blw_real_t blw_guard_step_alone(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
+                                const blw_real_t *tau, blw_real_t *step)
+{
+    const blw_real_t h = blw_guard_pull(r, l, e, tau, step);
+    const blw_real_t s = (h > k) ? (k / h) : BLW_R(1.0);
+
+    for (size_t a = 0U; a < r; a++) {
+        step[a] = (s * step[a]) - l[a];
+    }
+    return h;
+}
+
 /* Add step [r] to the sensor's own tau and l, and what it does to the l of the others. */
 static void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own,
                    const blw_real_t *step)
@@ -38,25 +62,14 @@ static void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_lo
 /* (7).  @return |step| */
 static blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own)
 {
-    const size_t            r      = self->model->r;
-    const blw_real_t *const e      = &self->e[own->sensor * r];
-    blw_real_t *const       step   = self->turned;
-    blw_real_t              square = BLW_R(0.0);
-    blw_real_t              moved  = BLW_R(0.0);
+    const size_t      r    = self->model->r;
+    blw_real_t *const step = self->turned;
+    const blw_real_t  h =
+        blw_guard_step_alone(r, own->k, own->l, &self->e[own->sensor * r], own->tau, step);
 
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = own->l[a] + (e[a] - own->tau[a]); /* h_i */
-        square += step[a] * step[a];
-    }
-    const blw_real_t h = blw_la_sqrt(square);
-    const blw_real_t s = (h > own->k) ? (own->k / h) : BLW_R(1.0);
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = (s * step[a]) - own->l[a];
-        moved += step[a] * step[a];
-    }
     spread(self, some, own, step);
     own->attacked = h > own->k;
-    return blw_la_sqrt(moved);
+    return blw_la_norm(r, step);
 }
 
 /* (11) for the last two sensors. */
@@ -115,32 +128,29 @@ static blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
     return blw_la_max(largest, eliminate(self, some));
 }
 
+/* Add `step` [r] to tau_i, with what that does to all l; attacked: nu_i /= 0 then. */
+static void move(blw_guard_t *self, size_t i, const blw_real_t *step, bool attacked)
+{
+    const size_t r = self->model->r;
+
+    blw_guard_move(self, i, step);
+    self->attacked |= guard_bit(i);
+    if (!attacked) {
+        blw_la_copy(r, &self->e[i * r], &self->eta[i * r]);
+        self->attacked &= ~guard_bit(i);
+    }
+}
+
 /* (7) for a sensor alone. */
 static void move_alone(blw_guard_t *self, const blw_guard_local_t *own)
 {
-    const size_t            r    = self->model->r;
-    const size_t            row  = own->sensor * r;
-    const blw_real_t *const e    = &self->e[row];
-    const blw_real_t *const l    = &self->l[row];
-    blw_real_t *const       tau  = &self->eta[row];
-    blw_real_t *const       step = self->turned;
-    blw_real_t              sum  = BLW_R(0.0);
+    const size_t      r    = self->model->r;
+    const size_t      row  = own->sensor * r;
+    blw_real_t *const step = self->turned;
+    const blw_real_t  h =
+        blw_guard_step_alone(r, own->k, &self->l[row], &self->e[row], &self->eta[row], step);
 
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = l[a] + (e[a] - tau[a]); /* h_i */
-        sum += step[a] * step[a];
-    }
-    const blw_real_t h = blw_la_sqrt(sum);
-    const blw_real_t s = (h > own->k) ? (own->k / h) : BLW_R(1.0);
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = (s * step[a]) - l[a];
-    }
-    blw_guard_move(self, own->sensor, step);
-    self->attacked |= guard_bit(own->sensor);
-    if (!(h > own->k)) {
-        blw_la_copy(r, e, tau);
-        self->attacked &= ~guard_bit(own->sensor);
-    }
+    move(self, own->sensor, step, h > own->k);
 }
 
 /* (10) for a sensor beside the one excluded. */
@@ -165,13 +175,8 @@ static void move_beside(blw_guard_t *self, const blw_guard_local_t *own,
     for (size_t a = 0U; a < r; a++) {
         other[a] = -other[a];
     }
-    blw_guard_move(self, i, step);
-    blw_guard_move(self, j, other);
-    self->attacked |= guard_bit(i) | guard_bit(j);
-    if (!attacked) {
-        blw_la_copy(r, &self->e[i * r], &self->eta[i * r]);
-        self->attacked &= ~guard_bit(i);
-    }
+    move(self, i, step, attacked);
+    move(self, j, other, true);
 }
 
 /* Give the sums of the steps to all sensors. */
@@ -187,12 +192,7 @@ static void settle(blw_guard_t *self, const blw_guard_some_t *some)
         for (size_t a = 0U; a < r; a++) {
             step[a] = own->tau[a] - self->eta[row + a];
         }
-        blw_guard_move(self, own->sensor, step);
-        self->attacked |= guard_bit(own->sensor);
-        if (!own->attacked) {
-            blw_la_copy(r, &self->e[row], &self->eta[row]);
-            self->attacked &= ~guard_bit(own->sensor);
-        }
+        move(self, own->sensor, step, own->attacked);
     }
 }
 

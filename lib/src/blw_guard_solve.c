@@ -45,23 +45,6 @@ typedef struct descent {
     blw_mask_t chosen;  /* what `decides` has ended with, or 0 */
 } descent_t;
 
-/* |step| of (7) for a sensor with nu_i /= 0 from its h_i and |h_i|. */
-static blw_real_t attacked_step(const blw_guard_t *self, size_t i, const blw_real_t *h,
-                                blw_real_t length)
-{
-    const size_t            r = self->model->r;
-    const blw_real_t *const l = &self->l[i * r];
-    const blw_real_t        s = (length > self->model->k) ? (self->model->k / length) : BLW_R(1.0);
-    blw_real_t              sum = BLW_R(0.0);
-
-    for (size_t a = 0U; a < r; a++) {
-        const blw_real_t step = (s * h[a]) - l[a];
-
-        sum += step * step;
-    }
-    return blw_la_sqrt(sum);
-}
-
 static void note_step(descent_t *descent, size_t i, blw_real_t length)
 {
     if (length > descent->largest) {
@@ -88,6 +71,7 @@ static void note_clipping(const blw_guard_t *self, descent_t *descent)
 /* All |h_i|, and the largest step.  The step of an excluded sensor is -l_i. */
 static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 {
+    const size_t     r        = self->model->r;
     const blw_real_t k        = self->model->k;
     blw_real_t      *h        = self->h;
     blw_mask_t       excluded = self->excluded;
@@ -101,8 +85,11 @@ static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 
         h[i] = step;
         if ((support & 1U) != 0U) {
-            h[i] = blw_guard_pull(self, i, self->step);
-            step = ((excluded & 1U) != 0U) ? step : attacked_step(self, i, self->step, h[i]);
+            const size_t row = i * r;
+
+            h[i] = blw_guard_step_alone(r, k, &self->l[row], &self->e[row], &self->eta[row],
+                                        self->step);
+            step = ((excluded & 1U) != 0U) ? step : blw_la_norm(r, self->step);
         } else {
             step -= k;
         }
