@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Secure fusion of local estimates: certificate, choice of engine, exit report.  See blw_l1.h for
- * the problem and its equation numbers.  The gap at nu with multipliers l = Z z is, for any t in [0, 1]
- * that makes t l feasible for the dual,
+ * the problem and its equation numbers.  The gap at nu with multipliers l = Z z is, for any t in
+ * [0, 1] that makes t l feasible for the dual,
  *     gap = sum_g (c_g |nu_g| - t l_g' nu_g) + (1 - t)^2 |z|^2 / 2,                          (5)
  * and since (2) is strongly convex in z,  |z - z*| <= e = sqrt(2 gap).  The minimisers differ by
  *     G (x* - x) = (nu - nu*) - W Z (z* - z)  with  sum_g c_g |nu*_g| <= f - (|z| - e)^2 / 2,
@@ -155,8 +155,8 @@ blw_real_t blw_l1_objective(const blw_l1_t *self, const blw_real_t *zeta)
     return sum;
 }
 
-/* An engine that was cut short may have been led astray by rounding: what it leaves counts only if it
- * is better than nu = 0, the Kalman estimate, of which the objective is `kalman`. */
+/* An engine that was cut short may have been led astray by rounding: what it leaves counts only if
+ * it is better than nu = 0, the Kalman estimate, of which the objective is `kalman`. */
 static BLW_APART void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_t kalman,
                                blw_real_t *x)
 {
@@ -172,28 +172,24 @@ static BLW_APART void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_
 
 BLW_COLD void blw_l1_init(blw_l1_t *self, const blw_l1_model_t *model, blw_real_t *mem)
 {
-    const size_t N = model->N;
-    const size_t d = model->d;
+    *self = (blw_l1_t){.model = model};
 
-    self->model = model;
-    self->tau   = mem;
-    self->l     = &self->tau[N];
-    self->dir   = &self->l[N];
-    self->step  = &self->dir[N];
-    self->z     = &self->step[N];
-    self->dz    = &self->z[d];
-    self->A     = &self->dz[d];
-    self->L     = &self->A[model->n_groups];
-    if (model->Z == NULL) {
-        self->L = &self->step[N + model->n];
-        self->z = &self->L[blw_la_packed_row(N)];
-    }
-    if ((model->Z == NULL) && blw_l1_has_pairs(model)) {
-        self->z  = &self->L[blw_la_packed_row(N + model->n)];
-        self->dz = &self->z[N];
-        self->A  = &self->dz[N];
-    }
+    self->tau = blw_la_take(&mem, model->N);
+    self->l   = blw_la_take(&mem, model->N);
+    self->dir = blw_la_take(&mem, model->N);
+    model->engine->lay_out(self, mem);
     blw_l1_reset(self);
+}
+
+BLW_COLD void blw_l1_lay_out_Z(blw_l1_t *self, blw_real_t *mem)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    self->step = blw_la_take(&mem, m->N);
+    self->z    = blw_la_take(&mem, m->d);
+    self->dz   = blw_la_take(&mem, m->d);
+    self->A    = blw_la_take(&mem, m->n_groups);
+    self->L    = mem;
 }
 
 BLW_COLD void blw_l1_reset(blw_l1_t *self)

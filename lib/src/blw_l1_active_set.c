@@ -5,8 +5,8 @@
  * objective never rises; the end is verified with z and l formed anew from tau. */
 #include "blw_l1_internal.h"
 
-/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end; and
- * low enough for either if full passes do not lower it any more, because tau is rounded. */
+/* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end;
+ * and low enough for either if full passes do not lower it any more, because tau is rounded. */
 #define RESIDUAL_ENTER   BLW_R(1e-4)
 #define RESIDUAL_FINAL   (BLW_R(256.0) * BLW_REAL_EPS)
 #define RESIDUAL_STALLED (BLW_R(8192.0) * BLW_REAL_EPS)
@@ -104,8 +104,8 @@ static size_t vanished_pair(const blw_l1_t *self, const blw_real_t *zeta, blw_re
     return found;
 }
 
-/* Whether a slope `at` after alpha steps is too steep upwards.  The objective is convex: over the step
- * it rises by at most alpha times this slope.  What is not a number is too steep. */
+/* Whether a slope `at` after alpha steps is too steep upwards.  The objective is convex: over the
+ * step it rises by at most alpha times this slope.  What is not a number is too steep. */
 static bool too_steep(const blw_l1_t *self, blw_real_t alpha, blw_real_t at, blw_real_t most)
 {
     return !(at <= most)
@@ -335,6 +335,7 @@ static bool fits(const blw_l1_model_t *m)
 
 const blw_l1_ops_t blw_l1_active_set_ops = {
     .fits     = fits,
+    .lay_out  = blw_l1_lay_out_Z,
     .multiply = blw_l1_multiply_Z,
     .solve    = solve,
 };

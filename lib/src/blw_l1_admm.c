@@ -131,6 +131,7 @@ static bool fits(const blw_l1_model_t *m)
 
 const blw_l1_ops_t blw_l1_admm_ops = {
     .fits     = fits,
+    .lay_out  = blw_l1_lay_out_Z,
     .multiply = blw_l1_multiply_Z,
     .solve    = solve,
 };

@@ -17,10 +17,12 @@
 struct blw_l1_ops {
     /* Whether the model has what the engine needs. */
     bool (*fits)(const blw_l1_model_t *model);
+    /* Share out the memory behind tau, l and dir: step and what else the engine uses. */
+    void (*lay_out)(blw_l1_t *self, blw_real_t *mem);
     /* l = S zeta. */
     void (*multiply)(blw_l1_t *self, const blw_real_t *zeta);
-    /* Where the certificate fails: from l = S zeta and the last solution to l, tau and x [n], the best
-     * that was found. */
+    /* Where the certificate fails: from l = S zeta and the last solution to tau, the best that was
+     * found; l and x [n] belong to it only where info->converged says that it is the minimum. */
     void (*solve)(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info);
 };
 
@@ -35,6 +37,12 @@ static inline const blw_real_t *blw_l1_row(const blw_l1_model_t *m, size_t i, si
 static inline size_t blw_l1_size(const blw_l1_model_t *m, size_t g)
 {
     return (size_t)m->first[g + 1U] - (size_t)m->first[g];
+}
+
+/* Row i of the packed triangle in self->L. */
+static inline blw_real_t *blw_l1_row_of_L(const blw_l1_t *self, size_t i)
+{
+    return &self->L[blw_la_packed_row(i)];
 }
 
 /* k-th group of the support. */
@@ -53,6 +61,8 @@ blw_real_t blw_l1_aim(blw_l1_t *self, const blw_real_t *zeta, size_t g);
 void blw_l1_project(const blw_l1_model_t *m, const blw_real_t *v, blw_real_t *out);
 /* l = Z z, all rows. */
 void blw_l1_multipliers(blw_l1_t *self);
+/* .lay_out of the engines on Z. */
+void blw_l1_lay_out_Z(blw_l1_t *self, blw_real_t *mem);
 /* z = Z' zeta, l = Z z: .multiply of the engines on Z. */
 void blw_l1_multiply_Z(blw_l1_t *self, const blw_real_t *zeta);
 /* Objective (2) at tau, with l = S tau. */
@@ -102,7 +112,8 @@ static inline blw_real_t blw_l1_slack(blw_real_t c_i)
 bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta);
 
 /* From l outside A and nu on A, both in self->l, as the sweeps left them, to l, tau and x [n].
- * *bound = |last correction of x|, *intact: T is as it was.  @return whether they make a minimum. */
+ * *bound = |last correction of x|, *intact: T is as it was.
+ * @return whether they make a minimum. */
 bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound,
                    bool *intact);
 
@@ -118,7 +129,16 @@ static inline void blw_l1_symv(const blw_l1_model_t *m, const blw_real_t *S, con
 }
 
 /* h = -G' l, [n]: 0 at a minimum. */
-void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h);
+void blw_l1_imbalance(const blw_l1_model_t *m, const blw_real_t *l, blw_real_t *h);
+/* tau = W l + G x, [N]. */
+void blw_l1_predict(const blw_l1_model_t *m, const blw_real_t *l, const blw_real_t *x,
+                    blw_real_t *tau);
+
+/* The factor L J L', J = diag(I, -I), of [W_ff G_f; G_f' 0] or the like (blw_l1_kkt.c), f rows and
+ * then the columns of G.  Finish row r >= f, which holds the matrix up to column r. */
+void blw_l1_reduce_row_of_G(const blw_l1_t *self, size_t f, size_t r);
+/* self->step [size] = (L J L')^-1 self->step. */
+void blw_l1_solve_LJL(blw_l1_t *self, size_t f, size_t size);
 
 /* Solve the optimality conditions for the rows in dir and l on them: l on the others, nu in tau and
  * x [n].  *bound = |last correction of x|.  @return whether they make a minimum. */

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
 /* Solve of the optimality conditions of (1) in blw_l1.h for a given A, in the covariance W.  With
- * mu = W l the minimiser satisfies zeta = G x + W l + nu, G' l = 0, nu_f = 0 on the rows f outside A and
- * l_A = c_A s_A on A:
+ * mu = W l the minimiser satisfies zeta = G x + W l + nu, G' l = 0, nu_f = 0 on the rows f outside
+ * A and l_A = c_A s_A on A:
  *     [ W_ff  G_f ] [ l_f ]   [ zeta_f - W_fA l_A ]
  *     [ G_f'  0   ] [ x   ] = [ -G_A' l_A         ],      nu_A = zeta_A - W_A l - G_A x.        (1)
  * It stays accurate where W is so ill-conditioned that S and its factors are not, because few rows
  * are in f; and it needs nothing of how A was found, so signs and sizes that survive it certify the
- * minimum.  The matrix is factored as L D L', D = diag(I, -I). */
+ * minimum.  The matrix is factored as L J L', J = diag(I, -I). */
 #include "blw_l1_internal.h"
 
 /* Least pivot of L: rows of W have about unit variance or more. */
@@ -18,25 +18,34 @@ typedef struct factor {
     size_t size; /* f + n */
 } factor_t;
 
-static blw_real_t *row_of_L(const blw_l1_t *self, size_t r)
+/* Finish row r of L, which holds the matrix up to column r, for a row outside A. */
+static void reduce_row(const blw_l1_t *self, size_t r)
 {
-    return &self->L[blw_la_packed_row(r)];
+    blw_real_t *const Lr = blw_l1_row_of_L(self, r);
+
+    blw_la_solve_lower(r, self->L, Lr);
+    Lr[r] = blw_la_sqrt(blw_la_max(Lr[r] - blw_la_dot(r, Lr, Lr), PIVOT_MIN * PIVOT_MIN));
 }
 
-/* Finish row r of L, which holds the matrix up to column r: the first f columns count +, others -. */
-static void reduce_row(const blw_l1_t *self, size_t f, size_t r)
+void blw_l1_reduce_row_of_G(const blw_l1_t *self, size_t f, size_t r)
 {
-    blw_real_t *const Lr = row_of_L(self, r);
+    blw_real_t *const Lr = blw_l1_row_of_L(self, r);
 
-    for (size_t q = 0U; q <= r; q++) {
-        const blw_real_t *const Lq   = row_of_L(self, q);
-        const size_t            plus = (q < f) ? q : f;
-        blw_real_t              rest = Lr[q] - blw_la_dot(plus, Lr, Lq);
-        if (q >= f) {
-            rest = -rest - blw_la_dot(q - f, &Lr[f], &Lq[f]);
-        }
+    blw_la_solve_lower(f, self->L, Lr);
+    for (size_t q = f; q <= r; q++) {
+        const blw_real_t *const Lq = blw_l1_row_of_L(self, q);
+        const blw_real_t rest = blw_la_dot(f, Lr, Lq) - Lr[q] - blw_la_dot(q - f, &Lr[f], &Lq[f]);
         Lr[q] = (q < r) ? (rest / Lq[q]) : blw_la_sqrt(blw_la_max(rest, PIVOT_MIN * PIVOT_MIN));
     }
+}
+
+void blw_l1_solve_LJL(blw_l1_t *self, size_t f, size_t size)
+{
+    blw_la_solve_lower(size, self->L, self->step);
+    for (size_t k = f; k < size; k++) {
+        self->step[k] = -self->step[k];
+    }
+    blw_la_solve_lower_t(size, self->L, self->step);
 }
 
 /* Of `count` numbers, `stride` apart, those of the rows that are not clipped. */
@@ -60,37 +69,46 @@ static factor_t factorise(blw_l1_t *self)
 
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
-            gather(self, &m->W[blw_la_packed_row(i)], 1U, i + 1U, row_of_L(self, made.f));
-            reduce_row(self, made.f + 1U, made.f);
+            gather(self, &m->W[blw_la_packed_row(i)], 1U, i + 1U, blw_l1_row_of_L(self, made.f));
+            reduce_row(self, made.f);
             made.f++;
         }
     }
     for (size_t k = 0U; k < m->n; k++) {
-        blw_real_t *const Lr = row_of_L(self, made.f + k);
+        blw_real_t *const Lr = blw_l1_row_of_L(self, made.f + k);
         gather(self, &m->G[k], m->n, m->N, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[made.f]);
-        reduce_row(self, made.f, made.f + k);
+        blw_l1_reduce_row_of_G(self, made.f, made.f + k);
     }
     made.size = made.f + m->n;
     return made;
 }
 
-void blw_l1_imbalance(const blw_l1_t *self, blw_real_t *h)
+void blw_l1_imbalance(const blw_l1_model_t *m, const blw_real_t *l, blw_real_t *h)
 {
-    const size_t n = self->model->n;
-
-    if (self->model->fast != NULL) {
-        self->model->fast->balance(self->model->G, self->l, h);
+    if (m->fast != NULL) {
+        m->fast->balance(m->G, l, h);
         return;
     }
-    for (size_t j = 0U; j < n; j++) {
-        const blw_real_t *G   = &self->model->G[j];
+    for (size_t j = 0U; j < m->n; j++) {
+        const blw_real_t *G   = &m->G[j];
         blw_real_t        sum = BLW_R(0.0);
-        for (size_t i = 0U; i < self->model->N; i++) {
-            sum += self->l[i] * *G;
-            G += n;
+        for (size_t i = 0U; i < m->N; i++) {
+            sum += l[i] * *G;
+            G += m->n;
         }
         h[j] = -sum;
+    }
+}
+
+void blw_l1_predict(const blw_l1_model_t *m, const blw_real_t *l, const blw_real_t *x,
+                    blw_real_t *tau)
+{
+    blw_l1_symv(m, m->W, l, tau);
+    if (m->fast != NULL) {
+        m->fast->predict(m->G, x, tau);
+    } else {
+        blw_la_gemv_add(m->N, m->n, m->G, x, tau);
     }
 }
 
@@ -100,15 +118,14 @@ static void residual(blw_l1_t *self, const blw_real_t *zeta, const blw_real_t *x
     const blw_l1_model_t *const m = self->model;
     size_t                      q = 0U;
 
-    blw_la_symv(m->N, m->W, self->l, self->tau);
-    blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
+    blw_l1_predict(m, self->l, x, self->tau);
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
             self->step[q] = zeta[i] - self->tau[i];
             q++;
         }
     }
-    blw_l1_imbalance(self, &self->step[q]);
+    blw_l1_imbalance(m, self->l, &self->step[q]);
 }
 
 /* Correct l_f and x by the residual.  @return |dx|. */
@@ -117,11 +134,7 @@ static blw_real_t correct(blw_l1_t *self, factor_t made, blw_real_t *x)
     const blw_l1_model_t *const m = self->model;
     size_t                      q = 0U;
 
-    blw_la_solve_lower(made.size, self->L, self->step);
-    for (size_t k = made.f; k < made.size; k++) {
-        self->step[k] = -self->step[k];
-    }
-    blw_la_solve_lower_t(made.size, self->L, self->step);
+    blw_l1_solve_LJL(self, made.f, made.size);
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
             self->l[i] += self->step[q];

@@ -10,6 +10,7 @@
  * has changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
  * Few rows are inside in the end, often hardly more than n, so that a step is cheap. */
 #include "blw_l1_newton.h"
+#include "blw_cold.h"
 
 /* First kappa, ratio of the next, and the least for which it is worth while. */
 #define KAPPA_FIRST BLW_R(10.0)
@@ -290,16 +291,11 @@ static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
 /* The point of the last kappa that settled; without one nu = 0. */
 static void fall_back(blw_l1_newton_t *at, bool any)
 {
-    blw_l1_t *const             self = at->l1;
-    const blw_l1_model_t *const m    = self->model;
-
     if (any) {
         restore(at);
     } else {
-        blw_la_copy(m->N, at->zeta, self->tau);
-        blw_la_gemv(m->n, m->N, m->F, self->tau, at->x);
+        blw_la_copy(at->l1->model->N, at->zeta, at->l1->tau);
     }
-    blw_la_symv(m->N, m->S, self->tau, self->l);
 }
 
 /* Nothing clipped, widths of all groups; kappa such that a gross attack alone is outside. */
@@ -356,6 +352,17 @@ static void multiply(blw_l1_t *self, const blw_real_t *zeta)
     blw_la_symv(self->model->N, self->model->S, zeta, self->l);
 }
 
+static BLW_COLD void lay_out(blw_l1_t *self, blw_real_t *mem)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    self->step = blw_la_take(&mem, (size_t)m->N + m->n);
+    self->L    = blw_la_take(&mem, blw_la_packed_row((size_t)m->N + m->n));
+    self->z    = blw_la_take(&mem, m->N);
+    self->dz   = blw_la_take(&mem, m->N);
+    self->A    = mem;
+}
+
 static bool fits(const blw_l1_model_t *m)
 {
     return blw_l1_has_pairs(m) && (m->Z == NULL) && (m->S != NULL) && (m->W != NULL)
@@ -364,6 +371,7 @@ static bool fits(const blw_l1_model_t *m)
 
 const blw_l1_ops_t blw_l1_newton_ops = {
     .fits     = fits,
+    .lay_out  = lay_out,
     .multiply = multiply,
     .solve    = solve,
 };

@@ -16,11 +16,6 @@
  * numbers can tell. */
 #define PIVOT2_MIN (BLW_R(16.0) * BLW_REAL_EPS)
 
-static blw_real_t *row_of_L(const blw_l1_t *self, size_t r)
-{
-    return &self->L[blw_la_packed_row(r)];
-}
-
 /* E' v down to group `last`, for v with its rows `stride` apart.  @return columns of E so far. */
 static size_t gather(const blw_l1_t *self, size_t last, const blw_real_t *v, size_t stride,
                      blw_real_t *out)
@@ -73,7 +68,7 @@ static void spread(const blw_l1_t *self, const blw_real_t *y, blw_real_t *v)
 /* Finish row r of L, which holds the matrix up to its diagonal, for a column of E. */
 static void reduce_row(blw_l1_newton_t *at, size_t r)
 {
-    blw_real_t *const Lr       = row_of_L(at->l1, r);
+    blw_real_t *const Lr       = blw_l1_row_of_L(at->l1, r);
     const blw_real_t  diagonal = Lr[r];
     const blw_real_t  least    = PIVOT2_MIN * diagonal;
 
@@ -81,21 +76,6 @@ static void reduce_row(blw_l1_newton_t *at, size_t r)
     const blw_real_t pivot2 = diagonal - blw_la_dot(r, Lr, Lr);
     at->weak                = at->weak || !(pivot2 > least);
     Lr[r]                   = blw_la_sqrt(blw_la_max(pivot2, least));
-}
-
-/* The same for a column of G, where J is -1. */
-static void reduce_row_of_G(const blw_l1_newton_t *at, size_t r)
-{
-    const size_t      f  = at->free;
-    blw_real_t *const Lr = row_of_L(at->l1, r);
-
-    blw_la_solve_lower(f, at->l1->L, Lr);
-    for (size_t q = f; q <= r; q++) {
-        const blw_real_t *const Lq = row_of_L(at->l1, q);
-        const blw_real_t rest = blw_la_dot(f, Lr, Lq) - Lr[q] - blw_la_dot(q - f, &Lr[f], &Lq[f]);
-        Lr[q] =
-            (q < r) ? (rest / Lq[q]) : blw_la_sqrt(blw_la_max(rest, BLW_REAL_EPS * BLW_REAL_EPS));
-    }
 }
 
 /* Share of l_g in nu_g: D inside, 0 outside. */
@@ -120,7 +100,7 @@ static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
 
     if (!blw_l1_outside(self, g, i)) {
         for (size_t k = 0U; k < size; k++) {
-            blw_real_t *const Lr = row_of_L(self, r + k);
+            blw_real_t *const Lr = blw_l1_row_of_L(self, r + k);
             (void)gather(self, g, (k == 0U) ? W_i : W_j, 1U, Lr);
             Lr[r + k] += share(at, g);
             reduce_row(at, r + k);
@@ -134,7 +114,7 @@ static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
             row[j] = (self->dir[i] * W_j[j]) - (self->dir[i + 1U] * W_i[j]);
         }
         row[i + 1U]          = (self->dir[i] * W_j[i + 1U]) - (self->dir[i + 1U] * W_j[i]);
-        blw_real_t *const Lr = row_of_L(self, r);
+        blw_real_t *const Lr = blw_l1_row_of_L(self, r);
         (void)gather(self, g, row, 1U, Lr);
         Lr[r] += blw_l1_nu(at, g, nu) / m->c[g];
         reduce_row(at, r);
@@ -153,11 +133,11 @@ static void factorise(blw_l1_newton_t *at)
         at->free += add_rows(at, g, at->free);
     }
     for (size_t k = 0U; k < m->n; k++) {
-        blw_real_t *const Lr = row_of_L(self, at->free + k);
+        blw_real_t *const Lr = blw_l1_row_of_L(self, at->free + k);
         (void)gather(self, m->n_groups - 1U, &m->G[k], m->n, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[at->free]);
         Lr[at->free + k] = -DAMPING / m->P[blw_la_packed_row(k) + k];
-        reduce_row_of_G(at, at->free + k);
+        blw_l1_reduce_row_of_G(self, at->free, at->free + k);
     }
 }
 
@@ -166,8 +146,7 @@ static void residual(const blw_l1_newton_t *at, const blw_real_t *l, blw_real_t 
 {
     const blw_l1_model_t *const m = at->l1->model;
 
-    blw_la_symv(m->N, m->W, l, v);
-    blw_la_gemv_add(m->N, m->n, m->G, at->x, v);
+    blw_l1_predict(m, l, at->x, v);
     for (size_t g = 0U; g < m->n_groups; g++) {
         const blw_real_t D = share(at, g);
         for (size_t j = m->first[g]; j < m->first[g + 1U]; j++) {
@@ -189,26 +168,12 @@ static void take_known(const blw_l1_t *self, blw_real_t *l)
     }
 }
 
-/* h = -G' l. */
-static void imbalance(const blw_l1_model_t *m, const blw_real_t *l, blw_real_t *h)
-{
-    blw_la_fill(m->n, BLW_R(0.0), h);
-    for (size_t i = 0U; i < m->N; i++) {
-        blw_la_axpy(m->n, -l[i], &m->G[i * m->n], h);
-    }
-}
-
 /* Solve (1) for the right-hand side in self->step; dx to its first n numbers, l += E l_E. */
 static void solve_system(blw_l1_newton_t *at, blw_real_t *l)
 {
     blw_l1_t *const self = at->l1;
-    const size_t    size = at->free + self->model->n;
 
-    blw_la_solve_lower(size, self->L, self->step);
-    for (size_t k = at->free; k < size; k++) {
-        self->step[k] = -self->step[k];
-    }
-    blw_la_solve_lower_t(size, self->L, self->step);
+    blw_l1_solve_LJL(self, at->free, at->free + self->model->n);
     spread(self, self->step, l);
     blw_la_copy(self->model->n, &self->step[at->free], self->step);
 }
@@ -258,7 +223,7 @@ void blw_l1_newton_step(blw_l1_newton_t *at)
     take_known(self, self->z);
     residual(at, self->z, self->dz);
     (void)gather(self, m->n_groups - 1U, self->dz, 1U, self->step);
-    imbalance(m, self->z, &self->step[at->free]);
+    blw_l1_imbalance(m, self->z, &self->step[at->free]);
     solve_system(at, self->z);
     blw_la_axpy(m->n, BLW_R(1.0), self->step, at->x);
     residual(at, self->z, self->dz);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* The end of a solve on the tableau (blw_l1_tableau.c): l, nu and x from the sweeps are corrected by
- * residuals formed in W and G, and held against (4) of blw_l1.h. */
+/* The end of a solve on the tableau (blw_l1_tableau.c): l, nu and x from the sweeps are corrected
+ * by residuals formed in W and G, and held against (4) of blw_l1.h. */
 #include "blw_l1_internal.h"
 
-/* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL, in
- * standard deviations of x, is the last. */
+/* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL,
+ * in standard deviations of x, is the last. */
 #define REFINEMENTS 3U
 #define SMALL       BLW_R(1e-2)
 
@@ -52,19 +52,6 @@ static void spread(const blw_l1_model_t *m, const blw_real_t *h, blw_real_t *out
     }
 }
 
-/* tau = W l + G x. */
-static void predict(blw_l1_t *self, const blw_real_t *x)
-{
-    const blw_l1_model_t *const m = self->model;
-
-    blw_l1_symv(m, m->W, self->l, self->tau);
-    if (m->fast != NULL) {
-        m->fast->predict(m->G, x, self->tau);
-    } else {
-        blw_la_gemv_add(m->N, m->n, m->G, x, self->tau);
-    }
-}
-
 /* From what the sweeps left: l_A = c_A s_A, tau = zeta - nu, x = F tau. */
 static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
 {
@@ -93,7 +80,7 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
     blw_real_t                  sum    = BLW_R(0.0);
     bool                        small  = true;
 
-    blw_l1_imbalance(self, h);
+    blw_l1_imbalance(m, self->l, h);
     spread(m, h, self->step);
     for (size_t i = 0U; i < m->N; i++) {
         const bool clipped = blw_l1_clipped(self, i);
@@ -130,7 +117,7 @@ bool blw_l1_refine(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_re
 
     split(self, zeta, x);
     for (size_t round = 0U; (round < REFINEMENTS) && !settled; round++) {
-        predict(self, x);
+        blw_l1_predict(self->model, self->l, x, self->tau);
         settled = correct(self, zeta, x, bound);
     }
     *intact = settled; /* the factors take the place of T */

@@ -14,11 +14,6 @@
  * below it. */
 #define PIVOT2_MIN (BLW_R(4.0) * BLW_REAL_EPS)
 
-static blw_real_t *row_of_L(const blw_l1_t *self, size_t k)
-{
-    return &self->L[blw_la_packed_row(k)];
-}
-
 /* Walks through the rows of A in the order of L. */
 typedef struct cursor {
     size_t k; /* member of A */
@@ -59,7 +54,7 @@ static void extend(blw_l1_t *self, size_t i)
     const size_t      k = self->rows;
     size_t            len;
     const blw_real_t *v  = blw_l1_row(self->model, i, &len);
-    blw_real_t *const h  = row_of_L(self, k);
+    blw_real_t *const h  = blw_l1_row_of_L(self, k);
     cursor_t          at = {0U, 0U};
 
     for (size_t r = 0U; r < k; r++) {
@@ -83,18 +78,18 @@ static void shrink(blw_l1_t *self, size_t r)
 
     for (size_t i = r + 1U; i < k; i++) {
         /* row i (columns 0..i) moves up; columns i-1 and i are rotated to clear its last entry */
-        const blw_real_t *const Li  = row_of_L(self, i);
+        const blw_real_t *const Li  = blw_l1_row_of_L(self, i);
         const blw_real_t        a   = Li[i - 1U];
         const blw_real_t        b   = Li[i];
         const blw_real_t        rho = blw_la_sqrt((a * a) + (b * b));
         for (size_t j = i; j < k; j++) {
-            blw_real_t *const Lj = row_of_L(self, j);
+            blw_real_t *const Lj = blw_l1_row_of_L(self, j);
             const blw_real_t  s  = Lj[i - 1U];
             const blw_real_t  t  = Lj[i];
             Lj[i - 1U]           = ((a * s) + (b * t)) / rho;
             Lj[i]                = ((a * t) - (b * s)) / rho;
         }
-        blw_la_copy(i, Li, row_of_L(self, i - 1U));
+        blw_la_copy(i, Li, blw_l1_row_of_L(self, i - 1U));
     }
 }
 
@@ -159,7 +154,7 @@ void blw_l1_support_factor(blw_l1_t *self, const blw_real_t *zeta)
         const size_t      g = blw_l1_member(self, at.k);
         const size_t      j = at.j;
         const size_t      i = next_row(self, &at);
-        blw_real_t *const H = row_of_L(self, r);
+        blw_real_t *const H = blw_l1_row_of_L(self, r);
         hessian_row(self, r, i, H);
         if (blw_l1_size(m, g) == 2U) {
             const blw_real_t least     = BLW_REAL_EPS * m->c[g];

@@ -1,26 +1,22 @@
 /* SPDX-License-Identifier: MIT */
-/* Active-set engine for (2) in blw_l1.h where every group has one row.  A = rows with nu /= 0, f = the
- * others.  The tableau, N x N, symmetric, packed by rows,
+/* Active-set engine for (2) in blw_l1.h where every group has one row.  A = rows with nu /= 0, f =
+ * the others.  The tableau, N x N, symmetric, packed by rows,
  *     T = S swept on A = [ -S_AA^-1          S_AA^-1 S_Af              ]                     (1)
  *                        [  S_fA S_AA^-1     S_ff - S_fA S_AA^-1 S_Af  ]
- * holds all that a change of A needs, and one sweep, N (N + 1) / 2 multiply-adds, updates it.  Every
- * solve starts from T = S, A empty: at most a few more sweeps than A has rows in the end, no worse than
- * from the last A under an attack, and rounding errors do not add up from step to step.
+ * holds all that a change of A needs, and one sweep, N (N + 1) / 2 multiply-adds, updates it.
+ * Every solve starts from T = S, A empty: at most a few more sweeps than A has rows in the end, no
+ * worse than from the last A under an attack, and rounding errors do not add up from step to step.
  * self->l holds l on f and nu on A meanwhile, so that one sum moves both.
  *     A row i with |l_i| > c_i enters: nu_i moves by t, and, l_A being held at c_A s_A,
- *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i or a nu_j vanishes, which then leaves.   (2)
+ *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i or a nu_j vanishes and leaves.    (2)
  * The objective never rises.  The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is
- * verified by the solve of blw_l1_kkt.c, which shares no number with T. */
+ * refined and verified in W and G (blw_l1_refine.c), or solved there anew where T is too coarse. */
 #include "blw/blw_l1_survey.h"
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Limit of |l_i| that sends every row of A to the test of its sign. */
 #define ALWAYS BLW_R(-1.0)
-
-static blw_real_t *row_of_T(const blw_l1_t *self, size_t i)
-{
-    return &self->L[blw_la_packed_row(i)];
-}
 
 /* Column k of T, whole. */
 static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
@@ -30,7 +26,7 @@ static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
         return;
     }
     const size_t            N  = self->model->N;
-    const blw_real_t *const Tk = row_of_T(self, k);
+    const blw_real_t *const Tk = blw_l1_row_of_L(self, k);
     size_t                  at = blw_la_packed_row(k + 1U) + k;
 
     blw_la_copy(k + 1U, Tk, col);
@@ -43,7 +39,7 @@ static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
 /* Rows i to i + 2 of T minus their part of share col col', up to their diagonals. */
 static void reduce_rows(blw_l1_t *self, size_t i, blw_real_t share, const blw_real_t *col)
 {
-    blw_real_t *const Ti = row_of_T(self, i);
+    blw_real_t *const Ti = blw_l1_row_of_L(self, i);
     blw_real_t *const Tj = &Ti[i + 1U];
     blw_real_t *const Tk = &Tj[i + 2U];
     const blw_real_t  a  = col[i] * share;
@@ -71,7 +67,7 @@ static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
         reduce_rows(self, i, share, col);
     }
     for (; i < N; i++) {
-        blw_la_axpy(i + 1U, -(col[i] * share), col, row_of_T(self, i));
+        blw_la_axpy(i + 1U, -(col[i] * share), col, blw_l1_row_of_L(self, i));
     }
 }
 
@@ -86,7 +82,7 @@ static void sweep(blw_l1_t *self, size_t k, const blw_real_t *col)
     }
     const size_t     N      = self->model->N;
     const blw_real_t factor = blw_la_abs(share);
-    blw_real_t      *Tk     = row_of_T(self, k);
+    blw_real_t      *Tk     = blw_l1_row_of_L(self, k);
 
     reduce(self, share, col);
     for (size_t j = 0U; j < k; j++) {
@@ -121,8 +117,8 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     return t;
 }
 
-/* z = l - t T_i, T_i in self->step; with share = 1 / T_ii the gains are those after row i has entered,
- * with 0 those of T as it is.  *seen: what comes next. */
+/* z = l - t T_i, T_i in self->step; with share = 1 / T_ii the gains are those after row i has
+ * entered, with 0 those of T as it is.  *seen: what comes next. */
 static void advance(const blw_l1_t *self, blw_real_t t, blw_real_t share, blw_l1_survey_t *seen)
 {
     if (self->model->fast != NULL) {
@@ -159,8 +155,8 @@ static void take_step(blw_l1_t *self)
     self->z = l;
 }
 
-/* Rows of A leave as their nu vanish, until row i can enter with sign s.  @return the sweeps made: none
- * if rounding leaves no way, at most `most`. */
+/* Rows of A leave as their nu vanish, until row i can enter with sign s.  @return the sweeps made:
+ * none if rounding leaves no way, at most `most`. */
 static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
 {
     blw_real_t nu     = BLW_R(0.0);
@@ -189,7 +185,7 @@ static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
     return sweeps;
 }
 
-/* Row i enters at once, *seen: what comes next.  @return whether it can; if not, nothing changed. */
+/* Row i enters at once, *seen: what comes next.  @return whether it can; else nothing changed. */
 static bool enter(blw_l1_t *self, size_t i, blw_real_t s, blw_l1_survey_t *seen)
 {
     column(self, i, self->step);
@@ -297,15 +293,21 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
             dropped = drop_turned(self, zeta);
         }
     } while (!info->converged && (info->iterations < m->max_iterations));
-    if (!info->converged) {
-        blw_l1_symv(m, m->S, self->tau, self->l);
-        blw_la_gemv(m->n, m->N, m->F, self->tau, x);
-    }
 }
 
 static void multiply(blw_l1_t *self, const blw_real_t *zeta)
 {
     blw_l1_symv(self->model, self->model->S, zeta, self->l);
+}
+
+/* z lies in what else only the factors of blw_l1_kkt.c need, which end it. */
+static BLW_COLD void lay_out(blw_l1_t *self, blw_real_t *mem)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    self->step = blw_la_take(&mem, (size_t)m->N + m->n);
+    self->L    = blw_la_take(&mem, blw_la_packed_row(m->N));
+    self->z    = mem;
 }
 
 static bool fits(const blw_l1_model_t *m)
@@ -316,6 +318,7 @@ static bool fits(const blw_l1_model_t *m)
 
 const blw_l1_ops_t blw_l1_tableau_ops = {
     .fits     = fits,
+    .lay_out  = lay_out,
     .multiply = multiply,
     .solve    = solve,
 };

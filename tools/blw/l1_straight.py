@@ -7,6 +7,9 @@ The matrices are arguments, packed by rows: one function serves S, W and the tab
 
 from collections.abc import Iterable
 
+import numpy as np
+from numpy.typing import NDArray
+
 from blw.straight import loads, names, statement
 from blw.tables import Code, Struct
 
@@ -91,33 +94,30 @@ def advance(N: int) -> Code:
 
 def fuse(n: int, N: int) -> Code:
     """F v."""
-    rows = [" + ".join(f"(M[{j * N + i}] * v{i})" for i in range(N)) for j in range(n)]
-    return product(N, [f"out[{j}] = {row};" for j, row in enumerate(rows)], "out = F v")
+    return product(np.arange(n * N).reshape(n, N), "=", "{};", "out = F v")
 
 
 def spread(n: int, N: int) -> Code:
     """F' h."""
-    rows = [" + ".join(f"(M[{j * N + i}] * v{j})" for j in range(n)) for i in range(N)]
-    return product(n, [f"out[{i}] = {row};" for i, row in enumerate(rows)], "out = F' v")
+    return product(np.arange(n * N).reshape(n, N).T, "=", "{};", "out = F' v")
 
 
 def predict(n: int, N: int) -> Code:
     """+ G x."""
-    rows = [" + ".join(f"(M[{i * n + j}] * v{j})" for j in range(n)) for i in range(N)]
-    return product(n, [f"out[{i}] += {row};" for i, row in enumerate(rows)], "out += G v")
+    return product(np.arange(N * n).reshape(N, n), "+=", "{};", "out += G v")
 
 
 def balance(n: int, N: int) -> Code:
     """-G' l."""
-    rows = [" + ".join(f"(M[{i * n + j}] * v{i})" for i in range(N)) for j in range(n)]
-    return product(N, [f"out[{j}] = -({row});" for j, row in enumerate(rows)], "out = -G' v")
+    return product(np.arange(N * n).reshape(N, n).T, "=", "-({});", "out = -G' v")
 
 
-def product(size: int, results: list[str], comment: str) -> Code:
-    """blw_l1_product_kernel_t of a vector of that size."""
-    lines = loads("v", names("v", size))
-    for left, right in (line.split("= ", 1) for line in results):
-        lines += statement(f"{left}=", right)
+def product(places: NDArray[np.int_], assign: str, value: str, comment: str) -> Code:
+    """blw_l1_product_kernel_t of a matrix whose entries are in these places of M."""
+    lines = loads("v", names("v", places.shape[1]))
+    for i, row in enumerate(places):
+        terms = " + ".join(f"(M[{place}] * v{j})" for j, place in enumerate(row))
+        lines += statement(f"out[{i}] {assign}", value.format(terms))
     return Code("void", "const blw_real_t *M, const blw_real_t *v, blw_real_t *out", tuple(lines),
                 comment)
 

@@ -6,7 +6,7 @@
 w_g = 1 for a real mode and sqrt2 for a complex pair, whose two rows are one group.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -89,8 +89,8 @@ def assemble(
     reduced_form, groups = fusion.reduced, fusion.groups
     gamma, figures = choose_gamma(fusion, model, float(np.trace(kalman.P)), options)
     problem = admm_tuning.Problem(reduced_form, groups, fusion.F, gamma, fusion.response)
-    link = choose_link(problem, fusion.P is not None, filters.cond_W)
-    engine, engine_figures = choose_engine(problem, kalman, options, link)
+    active_set = choose_active_set(problem, fusion.P is not None, filters.cond_W)
+    engine, engine_figures = choose_engine(problem, kalman, options, active_set)
     P = None if fusion.P is None else table(fusion.P, "[m][r x r] to canonical coordinates")
     tables = Struct(
         "blw_lasso_model_t",
@@ -175,28 +175,28 @@ def choose_gamma(
     return gamma, figures
 
 
-def choose_link(problem: admm_tuning.Problem, canonical: bool, cond_W: float) -> l1.Link:
+def choose_active_set(problem: admm_tuning.Problem, canonical: bool, cond_W: float) -> l1.Engine:
     """The active set for a problem: pivots on the tableau, or Newton steps on all groups at once
     where a local state may be a complex pair.
 
     In canonical coordinates few groups are ever attacked: there, pivots on Z are fewer and cheaper
     than Newton steps.
     """
-    paired = problem.groups.count < problem.reduced.Z.shape[0]
+    N = problem.reduced.Z.shape[0]
+    paired = problem.groups.count < N
     if cond_W > COND_COARSE or (paired and canonical):
-        return l1.ACTIVE_SET
-    return l1.NEWTON if paired else l1.TABLEAU
+        return l1.Engine(l1.ACTIVE_SET, (PIVOTS_IF_PAIRED if paired else PIVOTS) * N)
+    return l1.Engine(l1.NEWTON, NEWTON_STEPS) if paired else l1.Engine(l1.TABLEAU, PIVOTS * N)
 
 
 def choose_engine(
-    problem: admm_tuning.Problem, kalman: Kalman, options: Any, link: l1.Link
+    problem: admm_tuning.Problem, kalman: Kalman, options: Any, active_set: l1.Engine
 ) -> tuple[l1.Engine, dict[str, Any]]:
     """Engine and its bound on work; only `admm` is tuned, and only on request."""
     N, d = problem.reduced.Z.shape
     if options.engine != "admm":
-        pivots = PIVOTS_IF_PAIRED if problem.groups.count < N else PIVOTS
-        bound = options.max_iterations or (NEWTON_STEPS if link is l1.NEWTON else pivots * N)
-        return l1.Engine(link, bound), {
+        bound = options.max_iterations or active_set.max_iterations
+        return replace(active_set, max_iterations=bound), {
             "engine": "active_set",
             "max_iterations": bound,
         }

@@ -24,7 +24,7 @@ extern "C" {
 
 struct blw_l1;
 
-/** A way to solve (2).  The model holds its address, so that a firmware links only the one it uses. */
+/** A way to solve (2).  The model holds its address: a firmware links only the one it uses. */
 typedef struct blw_l1_ops blw_l1_ops_t;
 
 /** Pivots between supports; Newton steps where groups have two rows. */
@@ -58,8 +58,8 @@ typedef void (*blw_l1_advance_kernel_t)(const struct blw_l1 *self, blw_real_t t,
 /** A product with a matrix M, F [n x N] or G [N x n]. */
 typedef void (*blw_l1_product_kernel_t)(const blw_real_t *M, const blw_real_t *v, blw_real_t *out);
 
-/** Straight-line code for one N and n that the design tool writes: the numbers of the loops; only the sign of
- *  a zero may differ, which no sum that starts from +0 lets through. */
+/** Straight-line code for one N and n that the design tool writes: the numbers of the loops; only
+ *  the sign of a zero may differ, which no sum that starts from +0 lets through. */
 typedef struct blw_l1_kernels {
     blw_l1_symv_kernel_t    symv;
     blw_l1_column_kernel_t  column;
