@@ -21,8 +21,11 @@ public:
 
 std::unique_ptr<MethodTables> load_kalman(TableReader &tables, const blw_plant_t &plant)
 {
-    auto loaded     = std::make_unique<KalmanTables>();
-    loaded->model.K = tables.reals("K", static_cast<std::size_t>(plant.n) * plant.m);
+    auto              loaded = std::make_unique<KalmanTables>();
+    const std::size_t n      = plant.n;
+    loaded->model.K          = tables.reals("K", n * plant.m);
+    loaded->model.Acl        = tables.reals_or_null("Acl", n * n);
+    loaded->model.Bcl        = tables.reals_or_null("Bcl", n * plant.l);
     return loaded;
 }
 

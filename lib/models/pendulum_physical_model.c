@@ -123,6 +123,8 @@ const blw_kalman_model_t blw_pendulum_physical_kalman = {
         .plant  = &blw_pendulum_physical_plant,
     },
     .K    = kalman_K,
+    .Acl  = NULL,
+    .Bcl  = NULL,
     .step = kalman_step,
 };
 

@@ -14,6 +14,10 @@ static BLW_COLD blw_status_t check_model(const blw_kalman_model_t *model)
     }
     const blw_plant_t *const plant = model->head.plant;
     blw_table_add(&check, model->K, (size_t)plant->n * plant->m);
+    if (model->Acl != NULL) {
+        blw_table_add(&check, model->Acl, (size_t)plant->n * plant->n);
+        blw_table_add(&check, model->Bcl, (size_t)plant->n * plant->l);
+    }
     return blw_model_end(&model->head, &check);
 }
 
@@ -73,6 +77,42 @@ static bool quick_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t
     return true;
 }
 
+/* x = x + K_i r */
+static void take_in(const blw_kalman_model_t *model, size_t i, blw_real_t r, blw_real_t *x)
+{
+    const size_t n = model->head.plant->n;
+    const size_t m = model->head.plant->m;
+
+    for (size_t j = 0U; j < n; j++) {
+        x[j] += model->K[(j * m) + i] * r;
+    }
+}
+
+/* (3) if the model has it.  Returns false with x_hat untouched if not, or if it would overflow. */
+static bool closed_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y)
+{
+    const blw_kalman_model_t *const model = self->model;
+    const blw_plant_t *const        plant = model->head.plant;
+
+    if (model->Acl == NULL) {
+        return false;
+    }
+    blw_la_gemv(plant->n, plant->n, model->Acl, self->x_hat, self->x_bar);
+    if (u != NULL) {
+        blw_la_gemv_add(plant->n, plant->l, model->Bcl, u, self->x_bar);
+    }
+    for (size_t i = 0U; i < plant->m; i++) {
+        take_in(model, i, y[i] - plant->offset[i], self->x_bar);
+    }
+    if (!blw_la_bounded(plant->n, self->x_bar)) {
+        return false;
+    }
+    blw_la_copy(plant->n, self->x_bar, self->x_hat);
+    blw_la_fill(plant->m, BLW_R(0.0), self->suspicion);
+    self->calm = true;
+    return true;
+}
+
 /* (2) with the samples in used only; the suspicion of the others is 1. */
 static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
 {
@@ -88,11 +128,8 @@ static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
             continue;
         }
         const blw_real_t y_bar = blw_la_dot(n, &plant->C[i * n], self->x_bar);
-        const blw_real_t r     = (y[i] - plant->offset[i]) - y_bar;
 
-        for (size_t j = 0U; j < n; j++) {
-            self->x_hat[j] += self->model->K[(j * m) + i] * r;
-        }
+        take_in(self->model, i, (y[i] - plant->offset[i]) - y_bar, self->x_hat);
         self->suspicion[i] = BLW_R(0.0);
     }
 }
@@ -108,6 +145,9 @@ static blw_status_t checked_step(blw_kalman_t *self, const blw_real_t *u, const 
         return status;
     }
     *used = blw_plant_screen(plant, y, valid);
+    if ((*used == self->all) && closed_step(self, u, y)) {
+        return BLW_OK;
+    }
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
     correct(self, y, *used);
     if (!blw_la_bounded(plant->n, self->x_hat)) {

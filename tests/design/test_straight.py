@@ -121,6 +121,13 @@ def test_kernel_of_guard_given_modes_that_decay_has_the_bits_of_the_loops(tmp_pa
     assert compare(tmp_path, made, "guard", "f32") == "0 1\n"
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_kernel_of_kalman_given_a_dense_plant_has_the_bits_of_the_loops(tmp_path, width):
+    plant = model.load(MODELS / "random6.toml")
+    assert straight.closed(plant, steady(plant).K) is not None
+    assert compare(tmp_path, design.design_all(plant, ["kalman"]), "kalman", width) == "0 1\n"
+
+
 def steady(plant: model.Model) -> kalman.Kalman:
     return kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
 
@@ -132,6 +139,18 @@ def test_kalman_step_given_the_papers_example_counts_what_is_not_zero():
     assert "32 multiply-adds of 42" in code.comment  # A 3, Bu 1, C 13, K 15
 
 
+def test_kalman_step_given_a_dense_plant_is_the_closed_form():
+    plant = model.load(MODELS / "random6.toml")
+    code = straight.kalman_step(plant, steady(plant))
+    assert code is not None
+    assert "90 multiply-adds of 90" in code.comment  # n (n + l + m), not n (n + l + 2 m) = 138
+
+
+def test_closed_given_a_plant_of_ones_and_zeros_is_not_worth_it():
+    plant = model.load(MODELS / "pendulum.toml")
+    assert straight.closed(plant, steady(plant).K) is None
+
+
 def test_kalman_step_given_a_range_that_excludes_zero_is_left_to_the_loops():
     plant = model.load(MODELS / "liu5.toml")
     limits = plant.range.copy()
@@ -140,7 +159,7 @@ def test_kalman_step_given_a_range_that_excludes_zero_is_left_to_the_loops():
 
 
 def test_kalman_step_given_a_large_plant_is_left_to_the_loops():
-    n, m = 9, 12
+    n, m = 12, 16
     rows = np.random.default_rng(3).standard_normal((m, n)).tolist()
     plant = model.parse({"name": "large", "dt_s": 1.0,
                          "plant": {"A": (0.5 * np.eye(n)).tolist(), "C": rows,

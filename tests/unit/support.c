@@ -45,6 +45,8 @@ void support_kalman_make(support_kalman_t *made)
     made->model.head = (blw_model_t){
         .abi = BLW_MODEL_ABI, .method = (uint8_t)BLW_METHOD_KALMAN, .plant = &made->plant};
     made->model.K    = K;
+    made->model.Acl  = NULL;
+    made->model.Bcl  = NULL;
     made->model.step = NULL;
     support_kalman_seal(made);
 }
@@ -55,6 +57,10 @@ void support_kalman_seal(support_kalman_t *made)
 
     (void)blw_model_begin(&made->model.head, BLW_METHOD_KALMAN, &check);
     blw_table_add(&check, made->model.K, (size_t)made->plant.n * made->plant.m);
+    if (made->model.Acl != NULL) {
+        blw_table_add(&check, made->model.Acl, (size_t)made->plant.n * made->plant.n);
+        blw_table_add(&check, made->model.Bcl, (size_t)made->plant.n * made->plant.l);
+    }
     made->model.head.crc = check.crc;
 }
 

@@ -99,6 +99,45 @@ static void test_step_given_a_kernel_leaves_it_the_usual_step_only(void)
     TEST_ASSERT_EQUAL_INT(BLW_ERR_ARG, blw_kalman_step(&filter, NULL, NULL, 7U, &out));
 }
 
+static void test_step_given_the_closed_form_takes_it_where_every_sample_is_there(void)
+{
+    /* not A - K C A = 0.25 and Bu - K C Bu = 0.5, so that it shows what was used */
+    const blw_real_t Acl[1] = {BLW_R(10.0)};
+    const blw_real_t Bcl[1] = {BLW_R(100.0)};
+
+    made.model.Acl = Acl;
+    made.model.Bcl = Bcl;
+    support_kalman_seal(&made);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_init(&filter, &made.model, mem, MEM));
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, y, 6U, &out)); /* a gap: (1), (2) */
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 3.5, out.x_hat[0]);
+    TEST_ASSERT_REAL_WITHIN(0.0, 1.0, out.suspicion[0]);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, y, 7U, &out));
+    TEST_ASSERT_REAL_WITHIN(100.0 * SUPPORT_TOL, 138.0, out.x_hat[0]); /* 35 + 100 + 18/6 */
+    TEST_ASSERT_REAL_WITHIN(0.0, 0.0, out.suspicion[0]);
+    TEST_ASSERT_EQUAL_HEX8(0U, out.flags);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, NULL, y, 7U, &out));
+    TEST_ASSERT_REAL_WITHIN(1000.0 * SUPPORT_TOL, 1383.0, out.x_hat[0]);
+}
+
+static void test_step_given_the_closed_form_and_samples_that_overflow_it_predicts(void)
+{
+    const blw_real_t Acl[1] = {BLW_R(0.25)};
+    const blw_real_t K[3]   = {BLW_SIGNAL_MAX, BLW_R(0.0), BLW_R(0.0)};
+    const blw_real_t far[3] = {BLW_SIGNAL_MAX, y[1], y[2]};
+
+    made.model.K   = K;
+    made.model.Acl = Acl;
+    made.model.Bcl = Acl;
+    support_kalman_seal(&made);
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_init(&filter, &made.model, mem, MEM));
+    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, far, 7U, &out));
+    TEST_ASSERT_REAL_WITHIN(0.0, 3.0, out.x_hat[0]);
+    TEST_ASSERT_EQUAL_HEX64(0U, out.used);
+    made.model.Bcl = NULL;
+    TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, blw_kalman_init(&filter, &made.model, mem, MEM));
+}
+
 static void test_step_given_a_gap_or_bad_number_leaves_that_innovation_out(void)
 {
     const blw_real_t bad[3] = {support_nan, support_inf, BLW_REAL_MAX};
@@ -225,6 +264,8 @@ int main(void)
     RUN_TEST(test_init_given_a_bad_model_refuses);
     RUN_TEST(test_step_given_all_samples_yields_hand_computed_estimate);
     RUN_TEST(test_step_given_a_kernel_leaves_it_the_usual_step_only);
+    RUN_TEST(test_step_given_the_closed_form_takes_it_where_every_sample_is_there);
+    RUN_TEST(test_step_given_the_closed_form_and_samples_that_overflow_it_predicts);
     RUN_TEST(test_step_given_a_gap_or_bad_number_leaves_that_innovation_out);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);
     RUN_TEST(test_step_given_wrong_arguments_leaves_state_and_out_untouched);

@@ -109,8 +109,11 @@ def mode_text(z: complex) -> str:
 def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables of blw_kalman_model_t, and a detector on the filter's innovations."""
     on_samples = replace(kalman, K=kalman.K * model.weight)
+    Acl, Bcl = straight.closed(model, on_samples.K) or ([], [])
     tables = Struct("blw_kalman_model_t", NAME,
                     {"K": table(on_samples.K, "[n x m] steady-state gain"),
+                     "Acl": table(Acl, "[n x n] A - K C A"),
+                     "Bcl": table(Bcl, "[n x l] Bu - K C Bu"),
                      "step": straight.kalman_step(model, on_samples)}, method=NAME)
     S = model.C @ kalman.Pp @ model.C.T + model.sample_R
     info = {

@@ -24,8 +24,12 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Longest function, in multiply-adds: beyond, the loops cost little more and far less flash.
-MOST_TERMS = 256
+#: Longest function, in multiply-adds: beyond, its flash is too much for what it saves.
+MOST_TERMS = 320
+
+#: (3) of blw_kalman.h serves instead of (1) and (2) where it takes less than this part of the
+#: operations: then the plant is dense, and the one rounds as much as the other.
+CLOSED_PART = 0.8
 
 #: blw_real_t is float: bounds of the library, with room for rounding.
 SIGNAL_LIMIT = 1e14
@@ -34,38 +38,50 @@ RANGE_LIMIT = 0.99
 WIDTH = 96
 
 
+def closed(model: Model, K: Array) -> tuple[Array, Array] | None:
+    """Acl = A - K C A and Bcl = Bu - K C Bu where they serve better than A, Bu and C."""
+    Acl, Bcl = (flushed(M - K @ model.C @ M) for M in (model.A, model.Bu))
+    apart = _operations(*(flushed(M) for M in (model.A, model.Bu, model.C, K)))
+    return (Acl, Bcl) if _operations(Acl, Bcl, flushed(K)) < CLOSED_PART * apart else None
+
+
 def kalman_step(model: Model, kalman: "Kalman") -> Code | None:
     """blw_kalman_kernel_t of a plant, or None where loops serve it better."""
     n, m, l = model.n, model.m, model.l
-    terms = n * (n + l + 2 * m)
     limit = quick_limit(model, kalman)
+    merged = closed(model, kalman.K)
+    A, Bu = merged or (flushed(model.A), flushed(model.Bu))
+    C = np.zeros((m, n)) if merged else flushed(model.C)
+    K = flushed(kalman.K)
+    terms = n * (n + l + (m if merged else 2 * m))
     if terms > MOST_TERMS or limit is None:
         return None
-    A, Bu, C, K = (flushed(matrix) for matrix in (model.A, model.Bu, model.C, kalman.K))
-    offset = flushed(model.offset)
     x, u, y = names("x", n), names("u", l), names("y", m)
-    lines = [*loads("x_hat", x), *loads("u", u), *loads("y", y)]
-    squares = " + ".join(f"({v} * {v})" for v in (*x, *u, *y))
-    lines += statement("const blw_real_t size2 =", f"{squares};")
-    lines += ["", f"if (!(size2 <= {real(limit**2)})) {{", "    return false;", "}"]
+    lines = [*loads("x_hat", x), *loads("u", u), *loads("y", y), *_size_check([*x, *u, *y], limit)]
     for i in range(n):
-        terms_u = total(Bu[i], u) if l else ""
-        known = f" + ({terms_u})" if terms_u else ""
+        known = total(Bu[i], u)
         lines += statement(f"const blw_real_t p{i} =",
-                            f"(BLW_R(0.0){tail(A[i], x)}){known};")
+                           f"(BLW_R(0.0){tail(A[i], x)})" + (f" + ({known});" if known else ";"))
     for i in range(m):
-        sample = f"(y{i}{tail(-offset[i:i + 1], ['1'])})" if offset[i] else f"y{i}"
+        offset = tail(-flushed(model.offset[i:i + 1]), ["1"])
+        sample = f"(y{i}{offset})" if offset else f"y{i}"
         expected = total(C[i], names("p", n))
         lines += statement(f"const blw_real_t e{i} =",
-                            f"{sample} - ({expected});" if expected else f"{sample};")
+                           f"{sample} - ({expected});" if expected else f"{sample};")
     for j in range(n):
         lines += statement(f"x_hat[{j}] =", f"p{j}{tail(K[j], names('e', m))};")
-    lines.append("return true;")
     comment = (f"x_hat from k-1 to k: {_count(A, Bu, C, K)} multiply-adds of {terms}, the rest are "
                "zeros")
     unused = [] if l else ["(void)u;"]
     return Code("bool", "const blw_real_t *u, const blw_real_t *y, blw_real_t *x_hat",
-                tuple(unused + lines), comment)
+                (*unused, *lines, "return true;"), comment)
+
+
+def _size_check(values: Sequence[str], limit: float) -> list[str]:
+    """Refuse unless |values|_2 <= limit, and NaN."""
+    squares = " + ".join(f"({v} * {v})" for v in values)
+    return [*statement("const blw_real_t size2 =", f"{squares};"), "",
+            f"if (!(size2 <= {real(limit**2)})) {{", "    return false;", "}"]
 
 
 def jordan_step(J: Array, b: Array, D: Array) -> Code | None:
@@ -156,6 +172,12 @@ def total(factors: Array, names: Sequence[str]) -> str:
 def statement(left: str, right: str) -> list[str]:
     """left right, wrapped."""
     return textwrap.wrap(f"{left} {right}", WIDTH, subsequent_indent="    ")
+
+
+def _operations(*matrices: Array) -> int:
+    """What the products take: a sum a number, and load and product unless it is one."""
+    return sum(int(np.count_nonzero(M)) + 2 * int(np.count_nonzero(M * (np.abs(M) - 1.0)))
+               for M in matrices)
 
 
 def _count(*matrices: Array) -> int:

@@ -4,6 +4,10 @@
  *      x_bar    = A x_hat(k-1) + Bu u(k-1)                                                    (1)
  *      x_hat(k) = x_bar + K (y(k) - offset - C x_bar)                                         (2)
  *
+ *  or, where every sample is there and the plant is dense, the same with a third less work:
+ *
+ *      x_hat(k) = Acl x_hat(k-1) + Bcl u(k-1) + K (y(k) - offset)                             (3)
+ *
  *  It has no defence; it is here as the yardstick and as the peer of the secure methods.  A missing
  *  sample leaves its innovation out of (2).  [L] (7), known input added.
  */
@@ -14,7 +18,7 @@
 extern "C" {
 #endif
 
-/** (1) and (2) for one plant as straight-line code that the design tool writes: x_hat [n] from k-1 to
+/** (1) and (2), or (3), for one plant as straight-line code that the design tool writes: x_hat [n] from k-1 to
  *  k with u [l] and all of y [m], the same bits as the loops of blw_kalman_step().
  *  @return false with x_hat untouched unless u, x_hat and y are so small that no bound and no range
  *  can be exceeded, which also refuses NaN. */
@@ -23,6 +27,8 @@ typedef bool (*blw_kalman_kernel_t)(const blw_real_t *u, const blw_real_t *y, bl
 typedef struct blw_kalman_model {
     blw_model_t         head;
     const blw_real_t   *K;    /**< [n x m] steady-state gain */
+    const blw_real_t   *Acl;  /**< [n x n] A - K C A; NULL if (3) is not used */
+    const blw_real_t   *Bcl;  /**< [n x l] Bu - K C Bu; NULL with Acl or without inputs */
     blw_kalman_kernel_t step; /**< straight-line code for the usual step; may be NULL */
 } blw_kalman_model_t;
 
@@ -45,7 +51,7 @@ blw_status_t blw_kalman_init(blw_kalman_t *self, const blw_kalman_model_t *model
                              size_t mem_len);
 /** As blw_estimator_ops.reset. */
 blw_status_t blw_kalman_reset(blw_kalman_t *self, const blw_real_t *x0);
-/** As blw_estimator_ops.step.  n (n + l + 2 m) multiply-adds, whatever the data. */
+/** As blw_estimator_ops.step.  n (n + l + 2 m) multiply-adds, n (n + l + m) by (3). */
 blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
                              blw_mask_t valid, blw_estimator_out_t *out);
 
