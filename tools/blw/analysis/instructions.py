@@ -59,8 +59,9 @@ def _kalman(designed: Designed, plant: dict[str, Any]) -> int:
     step = designed.tables.members["step"]
     if isinstance(step, Code):
         return KALMAN_AROUND + operations(step)
-    n = plant["n"]
-    return KALMAN_AROUND + round(KALMAN_LOOP * n * (n + plant["l"] + 2 * plant["m"]))
+    n, m = plant["n"], plant["m"]
+    samples = m if designed.tables.members["Acl"] else 2 * m
+    return KALMAN_AROUND + round(KALMAN_LOOP * n * (n + plant["l"] + samples))
 
 
 def _decentral(designed: Designed, plant: dict[str, Any]) -> int | None:
