@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from blw import canonical, kalman
+from blw import canonical, coordinates, kalman
 from blw.build import ROOT, simulator
 from blw.design import Design, document, json_text, plant_tables
 from blw.l1_tuning import BenignLoss
@@ -71,8 +71,9 @@ def benign_of_admm(gamma: float, rho: float) -> float:
     converges to; it has many with weights 1."""
     model = parse(tomllib.loads(MODEL.read_text()), str(MODEL))
     gains = kalman.steady_state(model.A, model.C, model.W, model.R)
-    filters, modes = local_filters(model, gains), modes_of(model.A, model.C)
-    fused = canonical.fusion(np.ones(model.m), filters, modes, canonical.transforms(filters, modes))
+    filters = local_filters(model, gains)
+    space = coordinates.choose(modes_of(model.A, model.C), "jordan", gains.Acl)
+    fused = canonical.fusion(np.ones(model.m), filters, space, canonical.transforms(filters, space))
     loss = BenignLoss(fused.reduced, fused.groups, fused.F, float(np.trace(gains.P)), rho, 3000,
                       samples=10_000)
     return 1.0 + loss(gamma)

@@ -8,7 +8,7 @@ import golden
 import numpy as np
 import pytest
 
-from blw import canonical, kalman, model, modes, options
+from blw import canonical, coordinates, kalman, model, modes, options
 from blw.errors import DesignError, ModelError
 from blw.local_filters import local_filters
 
@@ -21,7 +21,8 @@ def shipped(name):
 
 
 def parts(plant, gains):
-    return local_filters(plant, gains), modes.modes_of(plant.A, plant.C)
+    space = coordinates.choose(modes.modes_of(plant.A, plant.C), "jordan", gains.Acl)
+    return local_filters(plant, gains), space
 
 
 @pytest.mark.parametrize("name", ["pendulum", "drone6", "torsion", "grid4"])

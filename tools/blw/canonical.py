@@ -3,7 +3,7 @@
 
 The local filters are those of `lasso`; xi_i = P_i zeta_i with P_i G_i X = H_i, where A X = X J is
 the real Jordan form of a non-derogatory A and H_i is diagonal: 1 where sensor i observes the
-coordinate, 0 elsewhere ([N] Theorem 2).  Then
+coordinate, 0 elsewhere ([N] Theorem 2; blw.coordinates tells where X is another).  Then
 
     minimise over x, mu, nu:  1/2 mu' M^-1 mu + gamma sum_i v_i sum_g w_g |nu_ig|,              (1)
     xi = H X^-1 x + mu + nu,   M = P~ W P~',                                                 (2)
@@ -29,12 +29,13 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from blw import l1, lasso
+from blw.coordinates import Choice, Coordinates, choose
 from blw.design import Designed
 from blw.errors import DesignError, ModelError
 from blw.kalman import Kalman
 from blw.local_filters import LocalFilters, local_filters
 from blw.model import Model
-from blw.modes import Modes, modes_of
+from blw.modes import modes_of
 
 Array = NDArray[np.float64]
 
@@ -62,7 +63,9 @@ class Options(lasso.Options):
 
     #: of every sensor's penalty; they must vary by less than (p + 1) / p
     weights: list[float] | None = None
-    #: printed: [N] as it stands, all weights 1
+    #: of the fusion, see blw.coordinates
+    coordinates: Choice = "auto"
+    #: printed: [N] as it stands, all weights 1, Jordan coordinates
     variant: Literal["corrected", "printed"] = "corrected"
 
 
@@ -70,29 +73,30 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables and figures of `canonical` for one model.  Raises ModelError, DesignError."""
     lasso.check_options(options, model, NAME)
     weights = sensor_weights(model, options)
-    modes = modes_of(model.A, model.C)
+    choice = "jordan" if options.variant == "printed" else options.coordinates
+    space = choose(modes_of(model.A, model.C), choice, kalman.Acl)
     filters = local_filters(model, kalman)
-    P = transforms(filters, modes)
-    return assemble(model, kalman, options, weights, filters, modes, P)
+    P = transforms(filters, space)
+    return assemble(model, kalman, options, weights, filters, space, P)
 
 
 def assemble(model: Model, kalman: Kalman, options: Options, weights: Array,
-             filters: LocalFilters, modes: Modes, P: Array) -> Designed:
+             filters: LocalFilters, space: Coordinates, P: Array) -> Designed:
     """Tables and figures for given transforms P [m x n x n] with P_i G_i X = H_i."""
-    fused = fusion(weights, filters, modes, P)
+    fused = fusion(weights, filters, space, P)
     designed = lasso.assemble(NAME, fused, filters, model, kalman, options)
-    return Designed(designed.tables, designed.info | figures(model, options, weights, modes, P),
+    return Designed(designed.tables, designed.info | figures(model, options, weights, space, P),
                     designed.mem)
 
 
-def fusion(weights: Array, filters: LocalFilters, modes: Modes, P: Array) -> lasso.Fusion:
+def fusion(weights: Array, filters: LocalFilters, space: Coordinates, P: Array) -> lasso.Fusion:
     """The problem (1) in reduced form for given transforms P [m x n x n]."""
     m, n = P.shape[:2]
-    local = modes.form.groups()
+    local = space.modes.form.groups()
     rows = [slice(i * n + first, i * n + first + size) for i in range(m) for first, size in local]
     stacked = scipy.linalg.block_diag(*P)
     M = stacked @ filters.W @ stacked.T
-    H = modes.observed.reshape(m * n, 1) * np.tile(np.linalg.inv(modes.X), (m, 1))
+    H = space.observed.reshape(m * n, 1) * np.tile(np.linalg.inv(space.X), (m, 1))
     reduced = l1.reduced((M + M.T) / 2.0, H, rows)
     deviation = np.sqrt(np.diag(filters.W)).reshape(m, n)
     filter_scale = 1.0 / block_means(filters, deviation).ravel()
@@ -103,16 +107,17 @@ def fusion(weights: Array, filters: LocalFilters, modes: Modes, P: Array) -> las
         response=P @ lasso.steady_response(filters),
         filter_scale=filter_scale,
         P=reduced.scale.reshape(m, n, 1) * P / filter_scale.reshape(m, 1, n),
-        ambiguous=ambiguous(weights, modes),
+        ambiguous=ambiguous(weights, space.observed),
     )
 
 
-def figures(model: Model, options: Options, weights: Array, modes: Modes, P: Array) -> dict:
+def figures(model: Model, options: Options, weights: Array, space: Coordinates, P: Array) -> dict:
     """What a reader wants to know beside the figures of lasso."""
     return {
         "variant": options.variant,
+        "coordinates_changed": space.changed,
         "weights": weights.tolist(),
-        "ambiguous": ambiguous(weights, modes),
+        "ambiguous": ambiguous(weights, space.observed),
         "modes": [
             {
                 "re": mode.eigenvalue.real,
@@ -120,10 +125,10 @@ def figures(model: Model, options: Options, weights: Array, modes: Modes, P: Arr
                 "multiplicity": mode.multiplicity,
                 "seen_by": [model.sensors[i] for i in np.flatnonzero(mode.seen)],
             }
-            for mode in modes.modes
+            for mode in space.modes.modes
         ],
         "cond_P": float(max(np.linalg.cond(P_i) for P_i in P)),
-        "cond_X": float(np.linalg.cond(modes.X)),
+        "cond_X": float(np.linalg.cond(space.X)),
     }
 
 
@@ -153,12 +158,12 @@ def default_weights(model: Model) -> Array:
     return 1.0 + offsets * min(1.0, 3.0 / max(model.p, 1))
 
 
-def ambiguous(weights: Array, modes: Modes) -> bool:
+def ambiguous(weights: Array, observed: Array) -> bool:
     """Whether the sensors that observe some coordinate can be split into two sides of one weight.
 
-    Then (1) has an interval of minimisers whenever the two sides disagree.
+    observed [m x n].  Then (1) has an interval of minimisers whenever the two sides disagree.
     """
-    return any(splits_evenly(weights[column]) for column in np.unique(modes.observed.T, axis=0))
+    return any(splits_evenly(weights[column]) for column in np.unique(observed.T, axis=0))
 
 
 def splits_evenly(weights: Sequence[float]) -> bool:
@@ -180,9 +185,9 @@ def block_means(filters: LocalFilters, rows: Array) -> Array:
     return means
 
 
-def transforms(filters: LocalFilters, modes: Modes) -> Array:
+def transforms(filters: LocalFilters, space: Coordinates) -> Array:
     """P [m x n x n].  Raises DesignError if they do not exist or cannot be computed."""
-    observed = modes.observed
+    observed = space.observed
     m, n = observed.shape
     if filters.r < n:
         raise DesignError(f"A - K C A is derogatory: its {filters.r} local states per sensor cannot"
@@ -190,7 +195,7 @@ def transforms(filters: LocalFilters, modes: Modes) -> Array:
     P = np.empty((m, n, n))
     for i in range(m):
         rows = slice(i * n, i * n + n)
-        G_i = filters.G[rows] @ modes.X
+        G_i = filters.G[rows] @ space.X
         P[i] = transform(G_i[:, observed[i]], filters.W[rows, rows], observed[i])
         error = np.abs(P[i] @ G_i - np.diag(observed[i])).max()
         if not error <= RESIDUAL:

@@ -92,15 +92,18 @@ def model_mapping(raw: Mapping[str, Any], where: str, name: str, p: int | None,
     shared = _shared_groups(raw, where) if groups else []
     if shared:
         attack["groups"] = shared
-    return {"name": name, "dt_s": raw["dt"], "plant": plant, "attack": attack}
+    return {"name": name, "dt_s": raw["dt"], "plant": plant, "attack": attack,
+            "method": {"canonical": {"coordinates": "orthogonal"}}}
 
 
 def model_toml(mapping: Mapping[str, Any]) -> str:
     """The text of a model file from its tables."""
     lines = [f"{key} = {_toml(mapping[key])}" for key in ("name", "dt_s")]
-    for name in ("plant", "attack"):
+    tables = {name: mapping[name] for name in ("plant", "attack")}
+    tables |= {f"method.{name}": options for name, options in mapping["method"].items()}
+    for name, table in tables.items():
         lines += ["", f"[{name}]"]
-        lines += [f"{key} = {_toml(value, len(key) + 4)}" for key, value in mapping[name].items()]
+        lines += [f"{key} = {_toml(value, len(key) + 4)}" for key, value in table.items()]
     return "\n".join(lines) + "\n"
 
 
