@@ -721,10 +721,107 @@ static void canonical_l1_fast_column(size_t k, const blw_real_t *T, blw_real_t *
     }
 }
 
-/* T swept on row k: 136 multiply-adds */
-static void canonical_l1_fast_sweep(size_t k, blw_real_t share, const blw_real_t *col, blw_real_t *T)
+/* z = l - t col */
+static bool canonical_l1_fast_advance(const struct blw_l1 *self, blw_real_t t)
+{
+    const blw_real_t *const l = self->l;
+    const blw_real_t *const dir = self->dir;
+    const blw_real_t *const col = self->step;
+    blw_real_t *const z = self->z;
+
+    const blw_real_t v0 = l[0] - (t * col[0]);
+    z[0] = v0;
+    if ((v0 * dir[0]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v1 = l[1] - (t * col[1]);
+    z[1] = v1;
+    if ((v1 * dir[1]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v2 = l[2] - (t * col[2]);
+    z[2] = v2;
+    if ((v2 * dir[2]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v3 = l[3] - (t * col[3]);
+    z[3] = v3;
+    if ((v3 * dir[3]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v4 = l[4] - (t * col[4]);
+    z[4] = v4;
+    if ((v4 * dir[4]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v5 = l[5] - (t * col[5]);
+    z[5] = v5;
+    if ((v5 * dir[5]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v6 = l[6] - (t * col[6]);
+    z[6] = v6;
+    if ((v6 * dir[6]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v7 = l[7] - (t * col[7]);
+    z[7] = v7;
+    if ((v7 * dir[7]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v8 = l[8] - (t * col[8]);
+    z[8] = v8;
+    if ((v8 * dir[8]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v9 = l[9] - (t * col[9]);
+    z[9] = v9;
+    if ((v9 * dir[9]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v10 = l[10] - (t * col[10]);
+    z[10] = v10;
+    if ((v10 * dir[10]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v11 = l[11] - (t * col[11]);
+    z[11] = v11;
+    if ((v11 * dir[11]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v12 = l[12] - (t * col[12]);
+    z[12] = v12;
+    if ((v12 * dir[12]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v13 = l[13] - (t * col[13]);
+    z[13] = v13;
+    if ((v13 * dir[13]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v14 = l[14] - (t * col[14]);
+    z[14] = v14;
+    if ((v14 * dir[14]) < BLW_R(0.0)) {
+        return false;
+    }
+    const blw_real_t v15 = l[15] - (t * col[15]);
+    z[15] = v15;
+    if ((v15 * dir[15]) < BLW_R(0.0)) {
+        return false;
+    }
+    return true;
+}
+
+/* T swept on row k and surveyed: 136 multiply-adds */
+static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_real_t share,
+    blw_l1_survey_t *seen)
 {
     const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;
+    const blw_real_t *const col = self->step;
+    const blw_real_t *const S = self->T;
+    const blw_real_t *const l = self->l;
+    const blw_real_t *const limit = self->tau;
+    blw_real_t *const T = self->L;
     blw_real_t *const row = &T[(k * (k + 1U)) / 2U];
     blw_real_t *const below = &T[k];
     const blw_real_t x0 = col[0];
@@ -743,159 +840,192 @@ static void canonical_l1_fast_sweep(size_t k, blw_real_t share, const blw_real_t
     const blw_real_t x13 = col[13];
     const blw_real_t x14 = col[14];
     const blw_real_t x15 = col[15];
+    blw_l1_survey_t found = {16U, BLW_R(0.0), BLW_R(1.0)};
 
     const blw_real_t a0 = x0 * share;
-    T[0] -= a0 * x0;
+    const blw_real_t d0 = S[0] - (a0 * x0);
+    T[0] = d0;
+    blw_l1_look(&found, 0U, l[0], limit[0], d0);
     const blw_real_t a1 = x1 * share;
-    T[1] -= a1 * x0;
-    T[2] -= a1 * x1;
+    T[1] = S[1] - (a1 * x0);
+    const blw_real_t d1 = S[2] - (a1 * x1);
+    T[2] = d1;
+    blw_l1_look(&found, 1U, l[1], limit[1], d1);
     const blw_real_t a2 = x2 * share;
-    T[3] -= a2 * x0;
-    T[4] -= a2 * x1;
-    T[5] -= a2 * x2;
+    T[3] = S[3] - (a2 * x0);
+    T[4] = S[4] - (a2 * x1);
+    const blw_real_t d2 = S[5] - (a2 * x2);
+    T[5] = d2;
+    blw_l1_look(&found, 2U, l[2], limit[2], d2);
     const blw_real_t a3 = x3 * share;
-    T[6] -= a3 * x0;
-    T[7] -= a3 * x1;
-    T[8] -= a3 * x2;
-    T[9] -= a3 * x3;
+    T[6] = S[6] - (a3 * x0);
+    T[7] = S[7] - (a3 * x1);
+    T[8] = S[8] - (a3 * x2);
+    const blw_real_t d3 = S[9] - (a3 * x3);
+    T[9] = d3;
+    blw_l1_look(&found, 3U, l[3], limit[3], d3);
     const blw_real_t a4 = x4 * share;
-    T[10] -= a4 * x0;
-    T[11] -= a4 * x1;
-    T[12] -= a4 * x2;
-    T[13] -= a4 * x3;
-    T[14] -= a4 * x4;
+    T[10] = S[10] - (a4 * x0);
+    T[11] = S[11] - (a4 * x1);
+    T[12] = S[12] - (a4 * x2);
+    T[13] = S[13] - (a4 * x3);
+    const blw_real_t d4 = S[14] - (a4 * x4);
+    T[14] = d4;
+    blw_l1_look(&found, 4U, l[4], limit[4], d4);
     const blw_real_t a5 = x5 * share;
-    T[15] -= a5 * x0;
-    T[16] -= a5 * x1;
-    T[17] -= a5 * x2;
-    T[18] -= a5 * x3;
-    T[19] -= a5 * x4;
-    T[20] -= a5 * x5;
+    T[15] = S[15] - (a5 * x0);
+    T[16] = S[16] - (a5 * x1);
+    T[17] = S[17] - (a5 * x2);
+    T[18] = S[18] - (a5 * x3);
+    T[19] = S[19] - (a5 * x4);
+    const blw_real_t d5 = S[20] - (a5 * x5);
+    T[20] = d5;
+    blw_l1_look(&found, 5U, l[5], limit[5], d5);
     const blw_real_t a6 = x6 * share;
-    T[21] -= a6 * x0;
-    T[22] -= a6 * x1;
-    T[23] -= a6 * x2;
-    T[24] -= a6 * x3;
-    T[25] -= a6 * x4;
-    T[26] -= a6 * x5;
-    T[27] -= a6 * x6;
+    T[21] = S[21] - (a6 * x0);
+    T[22] = S[22] - (a6 * x1);
+    T[23] = S[23] - (a6 * x2);
+    T[24] = S[24] - (a6 * x3);
+    T[25] = S[25] - (a6 * x4);
+    T[26] = S[26] - (a6 * x5);
+    const blw_real_t d6 = S[27] - (a6 * x6);
+    T[27] = d6;
+    blw_l1_look(&found, 6U, l[6], limit[6], d6);
     const blw_real_t a7 = x7 * share;
-    T[28] -= a7 * x0;
-    T[29] -= a7 * x1;
-    T[30] -= a7 * x2;
-    T[31] -= a7 * x3;
-    T[32] -= a7 * x4;
-    T[33] -= a7 * x5;
-    T[34] -= a7 * x6;
-    T[35] -= a7 * x7;
+    T[28] = S[28] - (a7 * x0);
+    T[29] = S[29] - (a7 * x1);
+    T[30] = S[30] - (a7 * x2);
+    T[31] = S[31] - (a7 * x3);
+    T[32] = S[32] - (a7 * x4);
+    T[33] = S[33] - (a7 * x5);
+    T[34] = S[34] - (a7 * x6);
+    const blw_real_t d7 = S[35] - (a7 * x7);
+    T[35] = d7;
+    blw_l1_look(&found, 7U, l[7], limit[7], d7);
     const blw_real_t a8 = x8 * share;
-    T[36] -= a8 * x0;
-    T[37] -= a8 * x1;
-    T[38] -= a8 * x2;
-    T[39] -= a8 * x3;
-    T[40] -= a8 * x4;
-    T[41] -= a8 * x5;
-    T[42] -= a8 * x6;
-    T[43] -= a8 * x7;
-    T[44] -= a8 * x8;
+    T[36] = S[36] - (a8 * x0);
+    T[37] = S[37] - (a8 * x1);
+    T[38] = S[38] - (a8 * x2);
+    T[39] = S[39] - (a8 * x3);
+    T[40] = S[40] - (a8 * x4);
+    T[41] = S[41] - (a8 * x5);
+    T[42] = S[42] - (a8 * x6);
+    T[43] = S[43] - (a8 * x7);
+    const blw_real_t d8 = S[44] - (a8 * x8);
+    T[44] = d8;
+    blw_l1_look(&found, 8U, l[8], limit[8], d8);
     const blw_real_t a9 = x9 * share;
-    T[45] -= a9 * x0;
-    T[46] -= a9 * x1;
-    T[47] -= a9 * x2;
-    T[48] -= a9 * x3;
-    T[49] -= a9 * x4;
-    T[50] -= a9 * x5;
-    T[51] -= a9 * x6;
-    T[52] -= a9 * x7;
-    T[53] -= a9 * x8;
-    T[54] -= a9 * x9;
+    T[45] = S[45] - (a9 * x0);
+    T[46] = S[46] - (a9 * x1);
+    T[47] = S[47] - (a9 * x2);
+    T[48] = S[48] - (a9 * x3);
+    T[49] = S[49] - (a9 * x4);
+    T[50] = S[50] - (a9 * x5);
+    T[51] = S[51] - (a9 * x6);
+    T[52] = S[52] - (a9 * x7);
+    T[53] = S[53] - (a9 * x8);
+    const blw_real_t d9 = S[54] - (a9 * x9);
+    T[54] = d9;
+    blw_l1_look(&found, 9U, l[9], limit[9], d9);
     const blw_real_t a10 = x10 * share;
-    T[55] -= a10 * x0;
-    T[56] -= a10 * x1;
-    T[57] -= a10 * x2;
-    T[58] -= a10 * x3;
-    T[59] -= a10 * x4;
-    T[60] -= a10 * x5;
-    T[61] -= a10 * x6;
-    T[62] -= a10 * x7;
-    T[63] -= a10 * x8;
-    T[64] -= a10 * x9;
-    T[65] -= a10 * x10;
+    T[55] = S[55] - (a10 * x0);
+    T[56] = S[56] - (a10 * x1);
+    T[57] = S[57] - (a10 * x2);
+    T[58] = S[58] - (a10 * x3);
+    T[59] = S[59] - (a10 * x4);
+    T[60] = S[60] - (a10 * x5);
+    T[61] = S[61] - (a10 * x6);
+    T[62] = S[62] - (a10 * x7);
+    T[63] = S[63] - (a10 * x8);
+    T[64] = S[64] - (a10 * x9);
+    const blw_real_t d10 = S[65] - (a10 * x10);
+    T[65] = d10;
+    blw_l1_look(&found, 10U, l[10], limit[10], d10);
     const blw_real_t a11 = x11 * share;
-    T[66] -= a11 * x0;
-    T[67] -= a11 * x1;
-    T[68] -= a11 * x2;
-    T[69] -= a11 * x3;
-    T[70] -= a11 * x4;
-    T[71] -= a11 * x5;
-    T[72] -= a11 * x6;
-    T[73] -= a11 * x7;
-    T[74] -= a11 * x8;
-    T[75] -= a11 * x9;
-    T[76] -= a11 * x10;
-    T[77] -= a11 * x11;
+    T[66] = S[66] - (a11 * x0);
+    T[67] = S[67] - (a11 * x1);
+    T[68] = S[68] - (a11 * x2);
+    T[69] = S[69] - (a11 * x3);
+    T[70] = S[70] - (a11 * x4);
+    T[71] = S[71] - (a11 * x5);
+    T[72] = S[72] - (a11 * x6);
+    T[73] = S[73] - (a11 * x7);
+    T[74] = S[74] - (a11 * x8);
+    T[75] = S[75] - (a11 * x9);
+    T[76] = S[76] - (a11 * x10);
+    const blw_real_t d11 = S[77] - (a11 * x11);
+    T[77] = d11;
+    blw_l1_look(&found, 11U, l[11], limit[11], d11);
     const blw_real_t a12 = x12 * share;
-    T[78] -= a12 * x0;
-    T[79] -= a12 * x1;
-    T[80] -= a12 * x2;
-    T[81] -= a12 * x3;
-    T[82] -= a12 * x4;
-    T[83] -= a12 * x5;
-    T[84] -= a12 * x6;
-    T[85] -= a12 * x7;
-    T[86] -= a12 * x8;
-    T[87] -= a12 * x9;
-    T[88] -= a12 * x10;
-    T[89] -= a12 * x11;
-    T[90] -= a12 * x12;
+    T[78] = S[78] - (a12 * x0);
+    T[79] = S[79] - (a12 * x1);
+    T[80] = S[80] - (a12 * x2);
+    T[81] = S[81] - (a12 * x3);
+    T[82] = S[82] - (a12 * x4);
+    T[83] = S[83] - (a12 * x5);
+    T[84] = S[84] - (a12 * x6);
+    T[85] = S[85] - (a12 * x7);
+    T[86] = S[86] - (a12 * x8);
+    T[87] = S[87] - (a12 * x9);
+    T[88] = S[88] - (a12 * x10);
+    T[89] = S[89] - (a12 * x11);
+    const blw_real_t d12 = S[90] - (a12 * x12);
+    T[90] = d12;
+    blw_l1_look(&found, 12U, l[12], limit[12], d12);
     const blw_real_t a13 = x13 * share;
-    T[91] -= a13 * x0;
-    T[92] -= a13 * x1;
-    T[93] -= a13 * x2;
-    T[94] -= a13 * x3;
-    T[95] -= a13 * x4;
-    T[96] -= a13 * x5;
-    T[97] -= a13 * x6;
-    T[98] -= a13 * x7;
-    T[99] -= a13 * x8;
-    T[100] -= a13 * x9;
-    T[101] -= a13 * x10;
-    T[102] -= a13 * x11;
-    T[103] -= a13 * x12;
-    T[104] -= a13 * x13;
+    T[91] = S[91] - (a13 * x0);
+    T[92] = S[92] - (a13 * x1);
+    T[93] = S[93] - (a13 * x2);
+    T[94] = S[94] - (a13 * x3);
+    T[95] = S[95] - (a13 * x4);
+    T[96] = S[96] - (a13 * x5);
+    T[97] = S[97] - (a13 * x6);
+    T[98] = S[98] - (a13 * x7);
+    T[99] = S[99] - (a13 * x8);
+    T[100] = S[100] - (a13 * x9);
+    T[101] = S[101] - (a13 * x10);
+    T[102] = S[102] - (a13 * x11);
+    T[103] = S[103] - (a13 * x12);
+    const blw_real_t d13 = S[104] - (a13 * x13);
+    T[104] = d13;
+    blw_l1_look(&found, 13U, l[13], limit[13], d13);
     const blw_real_t a14 = x14 * share;
-    T[105] -= a14 * x0;
-    T[106] -= a14 * x1;
-    T[107] -= a14 * x2;
-    T[108] -= a14 * x3;
-    T[109] -= a14 * x4;
-    T[110] -= a14 * x5;
-    T[111] -= a14 * x6;
-    T[112] -= a14 * x7;
-    T[113] -= a14 * x8;
-    T[114] -= a14 * x9;
-    T[115] -= a14 * x10;
-    T[116] -= a14 * x11;
-    T[117] -= a14 * x12;
-    T[118] -= a14 * x13;
-    T[119] -= a14 * x14;
+    T[105] = S[105] - (a14 * x0);
+    T[106] = S[106] - (a14 * x1);
+    T[107] = S[107] - (a14 * x2);
+    T[108] = S[108] - (a14 * x3);
+    T[109] = S[109] - (a14 * x4);
+    T[110] = S[110] - (a14 * x5);
+    T[111] = S[111] - (a14 * x6);
+    T[112] = S[112] - (a14 * x7);
+    T[113] = S[113] - (a14 * x8);
+    T[114] = S[114] - (a14 * x9);
+    T[115] = S[115] - (a14 * x10);
+    T[116] = S[116] - (a14 * x11);
+    T[117] = S[117] - (a14 * x12);
+    T[118] = S[118] - (a14 * x13);
+    const blw_real_t d14 = S[119] - (a14 * x14);
+    T[119] = d14;
+    blw_l1_look(&found, 14U, l[14], limit[14], d14);
     const blw_real_t a15 = x15 * share;
-    T[120] -= a15 * x0;
-    T[121] -= a15 * x1;
-    T[122] -= a15 * x2;
-    T[123] -= a15 * x3;
-    T[124] -= a15 * x4;
-    T[125] -= a15 * x5;
-    T[126] -= a15 * x6;
-    T[127] -= a15 * x7;
-    T[128] -= a15 * x8;
-    T[129] -= a15 * x9;
-    T[130] -= a15 * x10;
-    T[131] -= a15 * x11;
-    T[132] -= a15 * x12;
-    T[133] -= a15 * x13;
-    T[134] -= a15 * x14;
-    T[135] -= a15 * x15;
+    T[120] = S[120] - (a15 * x0);
+    T[121] = S[121] - (a15 * x1);
+    T[122] = S[122] - (a15 * x2);
+    T[123] = S[123] - (a15 * x3);
+    T[124] = S[124] - (a15 * x4);
+    T[125] = S[125] - (a15 * x5);
+    T[126] = S[126] - (a15 * x6);
+    T[127] = S[127] - (a15 * x7);
+    T[128] = S[128] - (a15 * x8);
+    T[129] = S[129] - (a15 * x9);
+    T[130] = S[130] - (a15 * x10);
+    T[131] = S[131] - (a15 * x11);
+    T[132] = S[132] - (a15 * x12);
+    T[133] = S[133] - (a15 * x13);
+    T[134] = S[134] - (a15 * x14);
+    const blw_real_t d15 = S[135] - (a15 * x15);
+    T[135] = d15;
+    blw_l1_look(&found, 15U, l[15], limit[15], d15);
 
     switch (k) {
     case 15U:
@@ -999,68 +1129,6 @@ static void canonical_l1_fast_sweep(size_t k, blw_real_t share, const blw_real_t
     default:
         break;
     }
-}
-
-/* z = l - t col, surveyed */
-static void canonical_l1_fast_advance(const struct blw_l1 *self, blw_real_t t, blw_real_t share,
-    blw_l1_survey_t *seen)
-{
-    const blw_real_t *const l = self->l;
-    const blw_real_t *const limit = self->tau;
-    const blw_real_t *const dir = self->dir;
-    const blw_real_t *const col = self->step;
-    const blw_real_t *const T = self->L;
-    blw_real_t *const z = self->z;
-    blw_l1_survey_t found = {16U, BLW_R(0.0), BLW_R(1.0), false};
-
-    const blw_real_t v0 = l[0] - (t * col[0]);
-    z[0] = v0;
-    blw_l1_look(&found, 0U, v0, limit[0], &dir[0], &T[0], &col[0], share);
-    const blw_real_t v1 = l[1] - (t * col[1]);
-    z[1] = v1;
-    blw_l1_look(&found, 1U, v1, limit[1], &dir[1], &T[2], &col[1], share);
-    const blw_real_t v2 = l[2] - (t * col[2]);
-    z[2] = v2;
-    blw_l1_look(&found, 2U, v2, limit[2], &dir[2], &T[5], &col[2], share);
-    const blw_real_t v3 = l[3] - (t * col[3]);
-    z[3] = v3;
-    blw_l1_look(&found, 3U, v3, limit[3], &dir[3], &T[9], &col[3], share);
-    const blw_real_t v4 = l[4] - (t * col[4]);
-    z[4] = v4;
-    blw_l1_look(&found, 4U, v4, limit[4], &dir[4], &T[14], &col[4], share);
-    const blw_real_t v5 = l[5] - (t * col[5]);
-    z[5] = v5;
-    blw_l1_look(&found, 5U, v5, limit[5], &dir[5], &T[20], &col[5], share);
-    const blw_real_t v6 = l[6] - (t * col[6]);
-    z[6] = v6;
-    blw_l1_look(&found, 6U, v6, limit[6], &dir[6], &T[27], &col[6], share);
-    const blw_real_t v7 = l[7] - (t * col[7]);
-    z[7] = v7;
-    blw_l1_look(&found, 7U, v7, limit[7], &dir[7], &T[35], &col[7], share);
-    const blw_real_t v8 = l[8] - (t * col[8]);
-    z[8] = v8;
-    blw_l1_look(&found, 8U, v8, limit[8], &dir[8], &T[44], &col[8], share);
-    const blw_real_t v9 = l[9] - (t * col[9]);
-    z[9] = v9;
-    blw_l1_look(&found, 9U, v9, limit[9], &dir[9], &T[54], &col[9], share);
-    const blw_real_t v10 = l[10] - (t * col[10]);
-    z[10] = v10;
-    blw_l1_look(&found, 10U, v10, limit[10], &dir[10], &T[65], &col[10], share);
-    const blw_real_t v11 = l[11] - (t * col[11]);
-    z[11] = v11;
-    blw_l1_look(&found, 11U, v11, limit[11], &dir[11], &T[77], &col[11], share);
-    const blw_real_t v12 = l[12] - (t * col[12]);
-    z[12] = v12;
-    blw_l1_look(&found, 12U, v12, limit[12], &dir[12], &T[90], &col[12], share);
-    const blw_real_t v13 = l[13] - (t * col[13]);
-    z[13] = v13;
-    blw_l1_look(&found, 13U, v13, limit[13], &dir[13], &T[104], &col[13], share);
-    const blw_real_t v14 = l[14] - (t * col[14]);
-    z[14] = v14;
-    blw_l1_look(&found, 14U, v14, limit[14], &dir[14], &T[119], &col[14], share);
-    const blw_real_t v15 = l[15] - (t * col[15]);
-    z[15] = v15;
-    blw_l1_look(&found, 15U, v15, limit[15], &dir[15], &T[135], &col[15], share);
     *seen = found;
 }
 
@@ -1183,8 +1251,8 @@ static void canonical_l1_fast_balance(const blw_real_t *M, const blw_real_t *v, 
 static const blw_l1_kernels_t canonical_l1_fast = {
     .symv    = canonical_l1_fast_symv,
     .column  = canonical_l1_fast_column,
-    .sweep   = canonical_l1_fast_sweep,
     .advance = canonical_l1_fast_advance,
+    .sweep   = canonical_l1_fast_sweep,
     .fuse    = canonical_l1_fast_fuse,
     .spread  = canonical_l1_fast_spread,
     .predict = canonical_l1_fast_predict,

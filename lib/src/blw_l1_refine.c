@@ -87,7 +87,7 @@ static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_r
         self->l[i] += clipped ? BLW_R(0.0) : self->step[i];
         self->step[i] = clipped ? -self->step[i] : (zeta[i] - self->tau[i]);
     }
-    blw_l1_symv(m, self->L, self->step, change);
+    blw_l1_symv(m, self->T, self->step, change);
     for (size_t i = 0U; i < m->N; i++) {
         if (blw_l1_clipped(self, i)) {
             self->tau[i] -= change[i];

@@ -15,23 +15,19 @@
 #include "blw_cold.h"
 #include "blw_l1_internal.h"
 
-/* Limit of |l_i| that sends every row of A to the test of its sign. */
-#define ALWAYS BLW_R(-1.0)
-
 /* Column k of T, whole. */
 static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
 {
     if (self->model->fast != NULL) {
-        self->model->fast->column(k, self->L, col);
+        self->model->fast->column(k, self->T, col);
         return;
     }
-    const size_t            N  = self->model->N;
-    const blw_real_t *const Tk = blw_l1_row_of_L(self, k);
-    size_t                  at = blw_la_packed_row(k + 1U) + k;
+    const size_t N  = self->model->N;
+    size_t       at = blw_la_packed_row(k + 1U) + k;
 
-    blw_la_copy(k + 1U, Tk, col);
+    blw_la_copy(k + 1U, &self->T[blw_la_packed_row(k)], col);
     for (size_t i = k + 1U; i < N; i++) {
-        col[i] = self->L[at];
+        col[i] = self->T[at];
         at += i + 1U;
     }
 }
@@ -71,20 +67,42 @@ static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
     }
 }
 
-/* Sweep (1) on row k, into A or out of it; col = column k. */
-static void sweep(blw_l1_t *self, size_t k, const blw_real_t *col)
+/* The row whose entry gains most. */
+static void survey(const blw_l1_t *self, blw_l1_survey_t *seen)
 {
-    const blw_real_t share = BLW_R(1.0) / col[k];
+    const blw_real_t *T_jj = self->T;
 
+    *seen = (blw_l1_survey_t){self->model->N, BLW_R(0.0), BLW_R(1.0)};
+    for (size_t j = 0U; j < self->model->N; j++) {
+        blw_l1_look(seen, j, self->l[j], self->tau[j], *T_jj);
+        T_jj += j + 2U;
+    }
+}
+
+/* T goes from S to self->L, where it can change. */
+static void settle(blw_l1_t *self)
+{
+    if (self->T != self->L) {
+        blw_la_copy(blw_la_packed_row(self->model->N), self->T, self->L);
+        self->T = self->L;
+    }
+}
+
+/* Sweep (1) on row k, into A or out of it, its column in self->step; *seen: what comes next. */
+static void sweep(blw_l1_t *self, size_t k, blw_real_t share, blw_l1_survey_t *seen)
+{
     if (self->model->fast != NULL) {
-        self->model->fast->sweep(k, share, col, self->L);
+        self->model->fast->sweep(self, k, share, seen);
+        self->T = self->L;
         return;
     }
-    const size_t     N      = self->model->N;
-    const blw_real_t factor = blw_la_abs(share);
-    blw_real_t      *Tk     = blw_l1_row_of_L(self, k);
+    const size_t            N      = self->model->N;
+    const blw_real_t        factor = blw_la_abs(share);
+    const blw_real_t *const col    = self->step;
 
+    settle(self);
     reduce(self, share, col);
+    blw_real_t *Tk = blw_l1_row_of_L(self, k);
     for (size_t j = 0U; j < k; j++) {
         Tk[j] = factor * col[j];
     }
@@ -93,6 +111,7 @@ static void sweep(blw_l1_t *self, size_t k, const blw_real_t *col)
         Tk += j;
         Tk[k] = factor * col[j];
     }
+    survey(self, seen);
 }
 
 /* How far nu_i can move by (2), col = column i: *block = the row of A that leaves, or i.
@@ -117,24 +136,19 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     return t;
 }
 
-/* z = l - t T_i, T_i in self->step; with share = 1 / T_ii the gains are those after row i has
- * entered, with 0 those of T as it is.  *seen: what comes next. */
-static void advance(const blw_l1_t *self, blw_real_t t, blw_real_t share, blw_l1_survey_t *seen)
+/* z = l - t T_i, T_i in self->step.  @return whether no nu turns round by it. */
+static bool advance(const blw_l1_t *self, blw_real_t t)
 {
     if (self->model->fast != NULL) {
-        self->model->fast->advance(self, t, share, seen);
-        return;
+        return self->model->fast->advance(self, t);
     }
-    const size_t            N    = self->model->N;
-    const blw_real_t *const col  = self->step;
-    const blw_real_t       *T_jj = self->L;
+    bool kept = true;
 
-    *seen = (blw_l1_survey_t){N, BLW_R(0.0), BLW_R(1.0), false};
-    for (size_t j = 0U; j < N; j++) {
-        self->z[j] = self->l[j] - (t * col[j]);
-        blw_l1_look(seen, j, self->z[j], self->tau[j], &self->dir[j], T_jj, &col[j], share);
-        T_jj += j + 2U;
+    for (size_t j = 0U; j < self->model->N; j++) {
+        self->z[j] = self->l[j] - (t * self->step[j]);
+        kept       = kept && !((self->z[j] * self->dir[j]) < BLW_R(0.0));
     }
+    return kept;
 }
 
 /* Row i enters A with sign s, or leaves it with s = 0. */
@@ -143,7 +157,7 @@ static void assign(blw_l1_t *self, size_t i, blw_real_t s)
     const blw_real_t c = self->model->c[i];
 
     self->dir[i] = s;
-    self->tau[i] = blw_l1_clipped(self, i) ? ALWAYS : (c + blw_l1_slack(c));
+    self->tau[i] = blw_l1_clipped(self, i) ? BLW_REAL_MAX : (c + blw_l1_slack(c));
 }
 
 /* z becomes l. */
@@ -157,7 +171,8 @@ static void take_step(blw_l1_t *self)
 
 /* Rows of A leave as their nu vanish, until row i can enter with sign s.  @return the sweeps made:
  * none if rounding leaves no way, at most `most`. */
-static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
+static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most,
+                         blw_l1_survey_t *seen)
 {
     blw_real_t nu     = BLW_R(0.0);
     unsigned   sweeps = 0U;
@@ -179,7 +194,7 @@ static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most)
             self->l[i] = nu;
             assign(self, i, s);
         }
-        sweep(self, block, self->step);
+        sweep(self, block, BLW_R(1.0) / self->step[block], seen);
         sweeps++;
     } while ((block != i) && (sweeps < most));
     return sweeps;
@@ -195,15 +210,13 @@ static bool enter(blw_l1_t *self, size_t i, blw_real_t s, blw_l1_survey_t *seen)
     const blw_real_t share = BLW_R(1.0) / self->step[i];
     const blw_real_t t     = (self->l[i] - (s * self->model->c[i])) * share;
 
-    assign(self, i, s);
-    advance(self, t, share, seen);
-    if (seen->turned) {
-        assign(self, i, BLW_R(0.0));
+    if (!advance(self, t)) {
         return false;
     }
     take_step(self);
     self->l[i] = t;
-    sweep(self, i, self->step);
+    assign(self, i, s);
+    sweep(self, i, share, seen);
     return true;
 }
 
@@ -213,14 +226,13 @@ static void pivot(blw_l1_t *self, blw_l1_info_t *info)
     const blw_l1_model_t *const m = self->model;
     blw_l1_survey_t             seen;
 
-    advance(self, BLW_R(0.0), BLW_R(0.0), &seen);
+    survey(self, &seen);
     while ((seen.best < m->N) && (info->iterations < m->max_iterations)) {
         const size_t     i      = seen.best;
         const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
         unsigned         sweeps = 1U;
         if (!enter(self, i, s, &seen)) {
-            sweeps = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations);
-            advance(self, BLW_R(0.0), BLW_R(0.0), &seen);
+            sweeps    = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations, &seen);
             seen.best = (sweeps > 0U) ? seen.best : m->N;
         }
         info->iterations = (uint16_t)(info->iterations + sweeps);
@@ -235,13 +247,14 @@ static void pivot(blw_l1_t *self, blw_l1_info_t *info)
 static void rebuild(blw_l1_t *self)
 {
     const blw_l1_model_t *const m = self->model;
+    blw_l1_survey_t             seen;
 
-    blw_la_copy(blw_la_packed_row(m->N), m->S, self->L);
+    self->T = m->S;
     for (size_t i = 0U; i < m->N; i++) {
         if (blw_l1_clipped(self, i)) {
             column(self, i, self->step);
             if (self->step[i] > BLW_L1_PIVOT_MIN) {
-                sweep(self, i, self->step);
+                sweep(self, i, BLW_R(1.0) / self->step[i], &seen);
             } else {
                 self->l[i] = self->model->c[i] * self->dir[i];
                 assign(self, i, BLW_R(0.0));
@@ -275,7 +288,6 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
 
     for (size_t i = 0U; i < m->N; i++) {
         assign(self, i, BLW_R(0.0));
-        self->step[i] = BLW_R(0.0);
     }
     do {
         if (dropped) {

@@ -138,12 +138,24 @@ static BLW_APART blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used
     return taken;
 }
 
+/* zeta += G d. */
+static void shift_filters(blw_lasso_t *self)
+{
+    const blw_l1_model_t *const l1 = self->model->l1;
+    const blw_real_t *const     G  = self->model->jordan->G;
+
+    if (l1->fast != NULL) {
+        l1->fast->predict(G, self->d, self->zeta);
+    } else {
+        blw_la_gemv_add(l1->N, l1->n, G, self->d, self->zeta);
+    }
+}
+
 /* (2) and (3): the estimate, which is the reference of the next step.
  * @return false if the fusion overflowed: the estimate is then the prediction. */
 static BLW_APART bool move_reference(blw_lasso_t *self)
 {
-    const blw_jordan_model_t *const jordan = self->model->jordan;
-    const size_t                    n      = self->model->head.plant->n;
+    const size_t n = self->model->head.plant->n;
 
     for (size_t j = 0U; j < n; j++) {
         self->x_hat[j] = self->x_bar[j] + self->d[j];
@@ -155,7 +167,7 @@ static BLW_APART bool move_reference(blw_lasso_t *self)
     for (size_t j = 0U; j < n; j++) {
         self->d[j] = self->x_bar[j] - self->x_hat[j]; /* what rounding has left of -d */
     }
-    blw_la_gemv_add(self->model->l1->N, n, jordan->G, self->d, self->zeta);
+    shift_filters(self);
     return true;
 }
 

@@ -26,7 +26,7 @@ def kernels(suffix: str, N: int, n: int) -> Struct | None:
     """blw_l1_kernels_t, or None where the loops serve better."""
     if N > MOST_ROWS:
         return None
-    members = {"symv": symv(N), "column": column(N), "sweep": sweep(N), "advance": advance(N),
+    members = {"symv": symv(N), "column": column(N), "advance": advance(N), "sweep": sweep(N),
                "fuse": fuse(n, N), "spread": spread(n, N), "predict": predict(n, N),
                "balance": balance(n, N)}
     return Struct("blw_l1_kernels_t", suffix, members)
@@ -61,35 +61,39 @@ def column(N: int) -> Code:
                 "column k of T")
 
 
+def advance(N: int) -> Code:
+    """blw_l1_advance_kernel_t."""
+    lines = ["const blw_real_t *const l = self->l;", "const blw_real_t *const dir = self->dir;",
+             "const blw_real_t *const col = self->step;", "blw_real_t *const z = self->z;", ""]
+    for j in range(N):
+        lines += [f"const blw_real_t v{j} = l[{j}] - (t * col[{j}]);", f"z[{j}] = v{j};",
+                  f"if ((v{j} * dir[{j}]) < BLW_R(0.0)) {{", "    return false;", "}"]
+    return Code("bool", "const struct blw_l1 *self, blw_real_t t", (*lines, "return true;"),
+                "z = l - t col")
+
+
 def sweep(N: int) -> Code:
     """blw_l1_sweep_kernel_t."""
     x = names("x", N)
     lines = ["const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;",
+             "const blw_real_t *const col = self->step;", "const blw_real_t *const S = self->T;",
+             "const blw_real_t *const l = self->l;", "const blw_real_t *const limit = self->tau;",
+             "blw_real_t *const T = self->L;",
              "blw_real_t *const row = &T[(k * (k + 1U)) / 2U];",
-             "blw_real_t *const below = &T[k];", *loads("col", x), ""]
+             "blw_real_t *const below = &T[k];", *loads("col", x),
+             f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0)}};", ""]
     for i in range(N):
         lines.append(f"const blw_real_t a{i} = {x[i]} * share;")
-        lines += [f"T[{at(i, j)}] -= a{i} * {x[j]};" for j in range(i + 1)]
+        lines += [f"T[{at(i, j)}] = S[{at(i, j)}] - (a{i} * {x[j]});" for j in range(i)]
+        lines += [f"const blw_real_t d{i} = S[{at(i, i)}] - (a{i} * {x[i]});",
+                  f"T[{at(i, i)}] = d{i};",
+                  f"blw_l1_look(&found, {i}U, l[{i}], limit[{i}], d{i});"]
     upper = [f"row[{j}] = factor * {x[j]};" for j in range(N)]
     lower = [f"below[{at(j, 0)}] = factor * {x[j]};" for j in range(1, N)]
-    lines += ["", *descend(upper), "row[k] = -share;", *ascend(lower)]
-    return Code("void", "size_t k, blw_real_t share, const blw_real_t *col, blw_real_t *T",
-                tuple(lines), f"T swept on row k: {N * (N + 1) // 2} multiply-adds")
-
-
-def advance(N: int) -> Code:
-    """blw_l1_advance_kernel_t."""
-    lines = ["const blw_real_t *const l = self->l;", "const blw_real_t *const limit = self->tau;",
-             "const blw_real_t *const dir = self->dir;",
-             "const blw_real_t *const col = self->step;", "const blw_real_t *const T = self->L;",
-             "blw_real_t *const z = self->z;",
-             f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0), false}};", ""]
-    for j in range(N):
-        lines += [f"const blw_real_t v{j} = l[{j}] - (t * col[{j}]);", f"z[{j}] = v{j};",
-                  f"blw_l1_look(&found, {j}U, v{j}, limit[{j}], &dir[{j}], &T[{at(j, j)}], "
-                  f"&col[{j}], share);"]
-    return Code("void", "const struct blw_l1 *self, blw_real_t t, blw_real_t share,\n"
-                "    blw_l1_survey_t *seen", (*lines, "*seen = found;"), "z = l - t col, surveyed")
+    lines += ["", *descend(upper), "row[k] = -share;", *ascend(lower), "*seen = found;"]
+    return Code("void", "const struct blw_l1 *self, size_t k, blw_real_t share,\n"
+                "    blw_l1_survey_t *seen", tuple(lines),
+                f"T swept on row k and surveyed: {N * (N + 1) // 2} multiply-adds")
 
 
 def fuse(n: int, N: int) -> Code:

@@ -13,11 +13,10 @@ extern "C" {
  *  those that are in. */
 #define BLW_L1_PIVOT_MIN (BLW_R(64.0) * BLW_REAL_EPS)
 
-/** Row j would get l or nu = v.  limit: of |l_j|, negative for a row with nu, whose sign is *dir.  The
- *  entry of a row gains excess^2 / T_jj, which is less by share col_j^2 after the present one. */
+/** Row j has |l_j| = |v| and the limit for it, which is that of no number where v is nu_j.  Its
+ *  entry would gain (|v| - limit)^2 / T_jj. */
 static inline void blw_l1_look(blw_l1_survey_t *seen, size_t j, blw_real_t v, blw_real_t limit,
-                               const blw_real_t *dir, const blw_real_t *T_jj,
-                               const blw_real_t *col_j, blw_real_t share)
+                               blw_real_t T_jj)
 {
 #ifdef BLW_REAL_DOUBLE
     const blw_real_t excess = fabs(v) - limit;
@@ -25,12 +24,9 @@ static inline void blw_l1_look(blw_l1_survey_t *seen, size_t j, blw_real_t v, bl
     const blw_real_t excess = fabsf(v) - limit;
 #endif
     if (excess > BLW_R(0.0)) {
-        if (limit < BLW_R(0.0)) {
-            seen->turned = seen->turned || ((v * *dir) < BLW_R(0.0));
-        } else {
-            const blw_real_t rest = *T_jj - (*col_j * *col_j * share);
-            const blw_real_t over = (rest < BLW_L1_PIVOT_MIN) ? BLW_L1_PIVOT_MIN : rest;
-            const blw_real_t gain = excess * excess;
+        const blw_real_t gain = excess * excess;
+        if ((gain * seen->over) > (seen->gain * T_jj)) {
+            const blw_real_t over = (T_jj < BLW_L1_PIVOT_MIN) ? BLW_L1_PIVOT_MIN : T_jj;
             if ((gain * seen->over) > (seen->gain * over)) {
                 seen->gain = gain;
                 seen->over = over;
