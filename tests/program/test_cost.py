@@ -12,7 +12,6 @@ from blw.cost import cases, document, sizes
 from blw.cost.programs import Program, build
 from blw.cost.targets import TARGETS
 
-SETTLED = cases.SETTLING_STEPS + cases.BENIGN_STEPS
 #: Largest error of the flash that `analyze` states for the tables.
 FLASH_ERROR = 0.02
 KEYS = {"method", "model", "target", "instructions_typical", "instructions_mean_attacked",
@@ -96,16 +95,13 @@ def documented(root):
 
 
 def test_footprint_given_the_documented_steps_is_within_a_tenth_of_their_instructions(root):
-    """Every row of a method that the design tool gives instructions for, but of a bank that was
-    measured in its warm-up, where it does less."""
+    """Every row of a method that the design tool gives instructions for."""
     checked = set()
     for model, method, measured in documented(root):
         if method not in instructions.FORMULAS:
             continue
         design = cases.designed(cases.CASES[model], method)
         designed = design.methods[method]
-        if designed.tables.members.get("warm_up", 0) > SETTLED and method == "bank":
-            continue
         computed = footprint(method, designed, design.plant).instructions_typical
         assert computed == pytest.approx(measured, rel=0.1), (model, method)
         checked.add(method)

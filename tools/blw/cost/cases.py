@@ -24,7 +24,7 @@ from blw.model import load
 from blw.options import suggestion
 
 #: In every scenario <name>_cost.toml the first steps serve to settle, the next are without attack,
-#: and all the others are attacked.
+#: and all the others are attacked.  A method that warms up for longer settles for a multiple.
 SETTLING_STEPS = 50
 BENIGN_STEPS = 50
 
@@ -70,12 +70,22 @@ class Log:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """A case with its design and its log; the sources are in `folder`."""
+    """A case with its design and its log, of which the first `settling` steps serve to settle; the
+    sources are in `folder`."""
 
     case: Case
     design: Design
     log: Log
     folder: Path
+    settling: int = SETTLING_STEPS
+
+    def settled_for(self, method: str) -> "Prepared":
+        """The same with a log that begins with as many steps as the method needs to settle."""
+        settling = settling_steps(self.design, method)
+        if settling == self.settling:
+            return self
+        log = simulate(self.case, self.design, settling=settling)
+        return replace(self, log=log, settling=settling)
 
 
 def named(names: Sequence[str]) -> list[Case]:
@@ -111,12 +121,23 @@ def owner(design: Design, method: str) -> str:
     return ctype.removeprefix("blw_").removesuffix("_model_t")
 
 
-def simulate(case: Case, design: Design, steps: int | None = None) -> Log:
-    """One run of the case's scenario by the simulator."""
+def settling_steps(design: Design, method: str) -> int:
+    """Before the first step that costs what every later one does."""
+    warm_up = design.methods[method].tables.members.get("warm_up", 0)
+    return SETTLING_STEPS * max(1, -(-warm_up // SETTLING_STEPS))
+
+
+def simulate(case: Case, design: Design, steps: int | None = None,
+             settling: int = SETTLING_STEPS) -> Log:
+    """One run of the case's scenario by the simulator, the attack put off until `settling` steps
+    and those without attack are over."""
     scenario = HOST_SIM / "scenarios" / f"{case.name}_cost.toml"
     content = tomllib.loads(scenario.read_text(encoding="utf-8"))
     content["model"] = str(HOST_SIM / "models" / f"{case.name}.toml")
-    content["steps"] = steps or content["steps"]
+    later = settling - SETTLING_STEPS
+    content["steps"] = (steps or content["steps"]) + later
+    for attack in content["attack"]:
+        attack["from"] += later
     only = replace(design, methods={kalman.NAME: design.methods[kalman.NAME]})
     with tempfile.TemporaryDirectory(prefix="bulwark.") as name:
         folder = Path(name)

@@ -21,12 +21,12 @@ import subprocess
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
 from blw.cost import programs
-from blw.cost.cases import SETTLING_STEPS, Prepared, owner
+from blw.cost.cases import Log, Prepared, owner
 from blw.cost.programs import Program
 
 #: The one target that the model is of.
@@ -103,12 +103,11 @@ def typical_cycles(program: Program, prepared: Prepared, typical: int) -> int | 
 def follow(program: Program, prepared: Prepared, typical: int) -> Trace:
     """The first FOLLOWED steps after the log has settled, or the last ones before that the budget
     allows, where a step is typically so many instructions.  Raises StepFailed."""
-    last = min(SETTLING_STEPS + FOLLOWED, BUDGET // typical)
+    last = min(prepared.settling + FOLLOWED, BUDGET // typical)
     owner_step = f"blw_{owner(prepared.design, program.method)}_step"
     code = disassemble(program)
     log = prepared.log
-    shorter = Prepared(prepared.case, prepared.design,
-                       type(log)(log.u[:last], log.y[:last], log.valid[:last]), prepared.folder)
+    shorter = replace(prepared, log=Log(log.u[:last], log.y[:last], log.valid[:last]))
     with tempfile.TemporaryDirectory(prefix="bulwark.") as folder:
         path = Path(folder, "trace")
         programs.run(program, shorter, f"{TRACE} {path}")

@@ -21,10 +21,10 @@ measurement.
 Executed instructions of one step, from the first of `blw_<method>_step` to its return: the median
 of {BENIGN_STEPS} steps without attack, the mean of 200 attacked steps, the most of all. The logs
 are those of `host_sim/scenarios/<model>_cost.toml`, which the simulator makes alike every time;
-the first {SETTLING_STEPS} steps serve to settle. QEMU counts exactly (`-icount shift=7` and a timer
-of the board; what an empty step takes is subtracted), so every run gives the same numbers. float32,
-gcc -O3, `-ffp-contract=off`. The Cortex-M0+ has no FPU: its instructions include the compiler's
-arithmetic.
+the first {SETTLING_STEPS} steps serve to settle, a multiple of them where a method warms up for
+longer. QEMU counts exactly (`-icount shift=7` and a timer of the board; what an empty step
+takes is subtracted), so every run gives the same numbers. float32, gcc -O3, `-ffp-contract=off`.
+The Cortex-M0+ has no FPU: its instructions include the compiler's arithmetic.
 
 Cycles are those of the typical step on a Cortex-M4F, by a model. QEMU says which instructions a
 step executes, and each takes what Arm's Technical Reference Manual says (DDI 0439, tables 3-1 and

@@ -11,7 +11,7 @@ import numpy as np
 
 from blw.build import StepFailed
 from blw.cost import programs
-from blw.cost.cases import BENIGN_STEPS, SETTLING_STEPS, Case, Prepared, owner, prepare
+from blw.cost.cases import BENIGN_STEPS, Case, Prepared, owner, prepare
 from blw.cost.cycles import typical_cycles
 from blw.cost.programs import Program
 from blw.cost.sizes import flash_bytes, ram_bytes
@@ -63,13 +63,14 @@ def _sizes(program: Program, prepared: Prepared) -> dict[str, Any]:
     return {**row, "options": dict(options)} if options else row
 
 
-def _row(program: Program, prepared: Prepared) -> dict[str, Any]:
+def _row(program: Program, unsettled: Prepared) -> dict[str, Any]:
+    prepared = unsettled.settled_for(program.method)
     replay = programs.run(program, prepared, ICOUNT)
     if np.any(replay.steps["status"] != 0) or len(replay.steps) != len(prepared.log.y):
         raise StepFailed(f"{program.target.name}: {program.name}: a step was refused")
     counts = replay.instructions(program.target)
-    attacked = counts[SETTLING_STEPS + BENIGN_STEPS:]
-    benign = counts[SETTLING_STEPS:SETTLING_STEPS + BENIGN_STEPS]
+    start, attack = prepared.settling, prepared.settling + BENIGN_STEPS
+    benign, attacked = counts[start:attack], counts[attack:]
     typical = int(np.median(benign))
     return {**_sizes(program, prepared),
             "instructions_typical": typical,
