@@ -97,6 +97,16 @@ def _lasso(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
     return typical, typical + tables["l1"]["max_iterations"] * pivot
 
 
+def _joint(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
+    """Filters and fusion; the recursion adds the factors of its rows."""
+    n, m, r, recursive = designed.mem
+    samples = len(designed.tables.to_json()["sensor"])
+    cost = _predict(plant) + m * n + (2 * r - 1) * n * n + samples * (2 * n + 2)
+    rows = r * (n + 2)
+    cost += rows * rows * (rows + 2 * r + n + m) if recursive else 0
+    return cost, cost
+
+
 def _decentral(designed: Designed, plant: dict[str, Any]) -> tuple[int | None, int | None]:
     n, m, mu, rows, recursive = designed.mem
     if recursive:
@@ -138,6 +148,6 @@ def _guard(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
 
 #: Multiply-adds as the headers of the modules state them.
 COSTS: dict[str, Callable[[Designed, dict[str, Any]], tuple[int | None, int | None]]] = {
-    "kalman": _kalman, "lasso": _lasso, "canonical": _lasso, "decentral": _decentral, "bank": _bank,
-    "guard": _guard,
+    "kalman": _kalman, "lasso": _lasso, "canonical": _lasso, "joint": _joint,
+    "decentral": _decentral, "bank": _bank, "guard": _guard,
 }

@@ -29,6 +29,16 @@ BANK_AROUND = 4170
 BANK_LOOP = 7.3
 BANK_LOOK = 21.4
 
+#: joint: around all, a sensor of the plant or of a local estimator, a local estimator, a
+#: multiply-add; with the recursion, where the rest no longer counts: see _joint().
+JOINT_AROUND = 624
+JOINT_SENSOR = 41
+JOINT_LOCAL = 594
+JOINT_LOOP = 7.53
+JOINT_FACTOR = 8.39
+JOINT_SAMPLE = 27.9
+JOINT_ROW = 49.4
+
 #: guard: a sensor, an operation of the straight-line code (registers that run out included), and a
 #: multiply-add of the loops.
 GUARD_SENSOR = 62
@@ -88,6 +98,19 @@ def _bank(designed: Designed, plant: dict[str, Any]) -> int:
     return BANK_AROUND + round(BANK_LOOP * (filters + tests) + BANK_LOOK * looks)
 
 
+def _joint(designed: Designed, plant: dict[str, Any]) -> int:
+    """The recursion factors its R rows of the length W, and every sample corrects the n + 2 rows of
+    its local estimator."""
+    n, m, r, recursive = designed.mem
+    samples = len(designed.tables.to_json()["sensor"])
+    if recursive:
+        R = r * (n + 2)
+        W = R + 2 * r + n + m
+        return round(W * (JOINT_FACTOR * R * R + JOINT_SAMPLE * samples * (n + 2) + JOINT_ROW * R))
+    macs = (n * (n + plant["l"]) + m * n + (2 * r - 1) * n * n + samples * (2 * n + 2))
+    return JOINT_AROUND + round(JOINT_SENSOR * (m + samples) + JOINT_LOCAL * r + JOINT_LOOP * macs)
+
+
 def _guard(designed: Designed, plant: dict[str, Any]) -> int:
     n, m, r, _ = designed.mem
     tables, N = designed.tables.to_json(), m * r
@@ -107,5 +130,5 @@ def _guard(designed: Designed, plant: dict[str, Any]) -> int:
 
 
 FORMULAS: dict[str, Callable[[Designed, dict[str, Any]], int | None]] = {
-    "kalman": _kalman, "decentral": _decentral, "bank": _bank, "guard": _guard,
+    "kalman": _kalman, "joint": _joint, "decentral": _decentral, "bank": _bank, "guard": _guard,
 }
