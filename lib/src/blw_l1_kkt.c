@@ -6,47 +6,14 @@
  *     [ G_f'  0   ] [ x   ] = [ -G_A' l_A         ],      nu_A = zeta_A - W_A l - G_A x.        (1)
  * It stays accurate where W is so ill-conditioned that S and its factors are not, because few rows
  * are in f; and it needs nothing of how A was found, so signs and sizes that survive it certify the
- * minimum.  The matrix is factored as L J L', J = diag(I, -I). */
+ * minimum.  The matrix is factored by blw_l1_factor.c. */
 #include "blw_l1_internal.h"
-
-/* Least pivot of L: rows of W have about unit variance or more. */
-#define PIVOT_MIN BLW_REAL_EPS
 
 /* Row and length of the factor: free rows first, then the n columns of G. */
 typedef struct factor {
     size_t f;    /* rows outside A */
     size_t size; /* f + n */
 } factor_t;
-
-/* Finish row r of L, which holds the matrix up to column r, for a row outside A. */
-static void reduce_row(const blw_l1_t *self, size_t r)
-{
-    blw_real_t *const Lr = blw_l1_row_of_L(self, r);
-
-    blw_la_solve_lower(r, self->L, Lr);
-    Lr[r] = blw_la_sqrt(blw_la_max(Lr[r] - blw_la_dot(r, Lr, Lr), PIVOT_MIN * PIVOT_MIN));
-}
-
-void blw_l1_reduce_row_of_G(const blw_l1_t *self, size_t f, size_t r)
-{
-    blw_real_t *const Lr = blw_l1_row_of_L(self, r);
-
-    blw_la_solve_lower(f, self->L, Lr);
-    for (size_t q = f; q <= r; q++) {
-        const blw_real_t *const Lq = blw_l1_row_of_L(self, q);
-        const blw_real_t rest = blw_la_dot(f, Lr, Lq) - Lr[q] - blw_la_dot(q - f, &Lr[f], &Lq[f]);
-        Lr[q] = (q < r) ? (rest / Lq[q]) : blw_la_sqrt(blw_la_max(rest, PIVOT_MIN * PIVOT_MIN));
-    }
-}
-
-void blw_l1_solve_LJL(blw_l1_t *self, size_t f, size_t size)
-{
-    blw_la_solve_lower(size, self->L, self->step);
-    for (size_t k = f; k < size; k++) {
-        self->step[k] = -self->step[k];
-    }
-    blw_la_solve_lower_t(size, self->L, self->step);
-}
 
 /* Of `count` numbers, `stride` apart, those of the rows that are not clipped. */
 static void gather(const blw_l1_t *self, const blw_real_t *v, size_t stride, size_t count,
@@ -70,7 +37,6 @@ static factor_t factorise(blw_l1_t *self)
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
             gather(self, &m->W[blw_la_packed_row(i)], 1U, i + 1U, blw_l1_row_of_L(self, made.f));
-            reduce_row(self, made.f);
             made.f++;
         }
     }
@@ -78,9 +44,9 @@ static factor_t factorise(blw_l1_t *self)
         blw_real_t *const Lr = blw_l1_row_of_L(self, made.f + k);
         gather(self, &m->G[k], m->n, m->N, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[made.f]);
-        blw_l1_reduce_row_of_G(self, made.f, made.f + k);
     }
     made.size = made.f + m->n;
+    (void)blw_l1_factor(self, made.f, made.size, BLW_R(0.0));
     return made;
 }
 

@@ -6,17 +6,22 @@
  * The objective is then smooth, l_g = c_g nu_g / max(|nu_g|, w), and a group is either inside, where
  * this is linear, or outside, where only a pair can still turn.  A Newton step solves the optimality
  * conditions for the present groups inside and outside (blw_l1_newton_step.c); a search along it
- * keeps the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no group
- * has changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
- * Few rows are inside in the end, often hardly more than n, so that a step is cheap. */
+ * keeps the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no
+ * group has changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
+ * Few rows are inside in the end, often hardly more than n, so that a step is cheap.  Noise is fresh
+ * in every sample and so are most sides: only what a gross attack has clipped is taken over from the
+ * last solve. */
 #include "blw_l1_newton.h"
 #include "blw_cold.h"
 
 /* First kappa, ratio of the next, and the least for which it is worth while. */
-#define KAPPA_FIRST BLW_R(10.0)
+#define KAPPA_FIRST BLW_R(0.03)
 #define KAPPA_GROSS BLW_R(0.1) /* the first, relative to l_g / width_g, if that is larger */
-#define KAPPA_RATIO BLW_R(0.1)
+#define KAPPA_RATIO BLW_R(0.2)
 #define KAPPA_LAST  BLW_R(1e-6)
+
+/* |nu_g| / width_g from which a group is taken to be under the same attack in the next solve. */
+#define GROSS BLW_R(10.0)
 
 /* Most steps for one kappa, and for kappa = 0. */
 #define STEPS       12U
@@ -29,7 +34,7 @@
 #define STUCK BLW_R(1e-9)
 
 /* Residual |l_g - c_g nu_g / max(|nu_g|, w)| / c_g that is good enough to go on. */
-#define SETTLED BLW_R(0.1)
+#define SETTLED BLW_R(0.5)
 
 /* Search: most halvings, slope at the end of a whole step that is let pass, and of a shorter one,
  * as parts of the first slope. */
@@ -298,21 +303,63 @@ static void fall_back(blw_l1_newton_t *at, bool any)
     }
 }
 
-/* Nothing clipped, widths of all groups; kappa such that a gross attack alone is outside. */
+/* tau and l: nothing clipped, or, if that is better, the groups that were under a gross attack in the
+ * last solve clipped as they were then. */
+static void start_from_last(const blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self   = at->l1;
+    const blw_l1_model_t *const m      = self->model;
+    const blw_real_t            kalman = blw_la_dot(m->N, at->zeta, self->l);
+    blw_real_t                  sum    = BLW_R(0.0); /* sum_g c_g |nu_g| */
+
+    blw_la_copy(m->N, at->zeta, self->tau);
+    if (self->n_A == 0U) {
+        return;
+    }
+    blw_la_copy(m->N, at->zeta, self->dz);
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const size_t i = m->first[g];
+        blw_la_axpy(blw_l1_size(m, g), -self->A[g], &self->dir[i], &self->dz[i]);
+        sum += m->c[g] * self->A[g];
+    }
+    blw_la_symv(m->N, m->S, self->dz, self->z);
+    if ((blw_la_dot(m->N, self->dz, self->z) + (BLW_R(2.0) * sum)) < kalman) {
+        blw_la_copy(m->N, self->dz, self->tau);
+        blw_la_copy(m->N, self->z, self->l);
+    }
+}
+
+/* The first point and its sides; kappa such that a gross attack alone is outside. */
 static void start(blw_l1_newton_t *at)
 {
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
 
+    start_from_last(at);
     at->kappa = KAPPA_FIRST;
     for (size_t g = 0U; g < m->n_groups; g++) {
         const size_t i = m->first[g];
         self->A[g]     = blw_la_sqrt(m->W[blw_la_packed_row(i) + i]);
         at->kappa = blw_la_max(at->kappa, (KAPPA_GROSS * blw_l1_norm(m, g, self->l)) / self->A[g]);
     }
-    blw_la_copy(m->N, at->zeta, self->tau);
-    blw_la_fill(m->N, BLW_R(0.0), self->dir);
-    blw_la_gemv(m->n, m->N, m->F, at->zeta, at->x);
+    (void)aim(at, false);
+    blw_la_gemv(m->n, m->N, m->F, self->tau, at->x);
+}
+
+/* |nu_g| of the groups under a gross attack to A, 0 for the others; dir holds the directions. */
+static void remember(const blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+
+    self->n_A = 0U;
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        blw_real_t       nu[2];
+        const blw_real_t norm  = blw_l1_nu(at, g, nu);
+        const bool       gross = norm > (GROSS * self->A[g]);
+        self->A[g]             = gross ? norm : BLW_R(0.0);
+        self->n_A              = (uint16_t)(self->n_A + (gross ? 1U : 0U));
+    }
 }
 
 static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
@@ -342,7 +389,10 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
             tighten(&at);
         }
     }
-    if (!info->converged) {
+    if (info->converged) {
+        remember(&at);
+    } else {
+        self->n_A = 0U;
         fall_back(&at, any);
     }
 }

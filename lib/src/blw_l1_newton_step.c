@@ -6,7 +6,7 @@
  * D = kappa width_g / c_g inside, |nu_g| / c_g for a pair outside; l_0 = c dir outside.  The system
  * is solved for the change from the present point, so that rounding errors do not stay.  R, a small
  * part of the information on x, holds x where E' G leaves it open; it only damps the change.
- * The matrix is factored as L J L', J = diag(I, -I). */
+ * The matrix is factored by blw_l1_factor.c. */
 #include "blw_l1_newton.h"
 
 /* R relative to the information of the Kalman estimate. */
@@ -65,19 +65,6 @@ static void spread(const blw_l1_t *self, const blw_real_t *y, blw_real_t *v)
     }
 }
 
-/* Finish row r of L, which holds the matrix up to its diagonal, for a column of E. */
-static void reduce_row(blw_l1_newton_t *at, size_t r)
-{
-    blw_real_t *const Lr       = blw_l1_row_of_L(at->l1, r);
-    const blw_real_t  diagonal = Lr[r];
-    const blw_real_t  least    = PIVOT2_MIN * diagonal;
-
-    blw_la_solve_lower(r, at->l1->L, Lr);
-    const blw_real_t pivot2 = diagonal - blw_la_dot(r, Lr, Lr);
-    at->weak                = at->weak || !(pivot2 > least);
-    Lr[r]                   = blw_la_sqrt(blw_la_max(pivot2, least));
-}
-
 /* Share of l_g in nu_g: D inside, 0 outside. */
 static blw_real_t share(const blw_l1_newton_t *at, size_t g)
 {
@@ -88,7 +75,7 @@ static blw_real_t share(const blw_l1_newton_t *at, size_t g)
                : ((at->kappa * self->A[g]) / self->model->c[g]);
 }
 
-/* Rows of L for the columns of E of group g, from row r on.  @return their number. */
+/* Rows of the matrix for the columns of E of group g, from row r on.  @return their number. */
 static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
 {
     const blw_l1_t *const       self = at->l1;
@@ -103,7 +90,6 @@ static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
             blw_real_t *const Lr = blw_l1_row_of_L(self, r + k);
             (void)gather(self, g, (k == 0U) ? W_i : W_j, 1U, Lr);
             Lr[r + k] += share(at, g);
-            reduce_row(at, r + k);
         }
         return size;
     }
@@ -117,18 +103,16 @@ static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
         blw_real_t *const Lr = blw_l1_row_of_L(self, r);
         (void)gather(self, g, row, 1U, Lr);
         Lr[r] += blw_l1_nu(at, g, nu) / m->c[g];
-        reduce_row(at, r);
     }
     return size - 1U;
 }
 
 static void factorise(blw_l1_newton_t *at)
 {
-    const blw_l1_t *const       self = at->l1;
+    blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
 
     at->free = 0U;
-    at->weak = false;
     for (size_t g = 0U; g < m->n_groups; g++) {
         at->free += add_rows(at, g, at->free);
     }
@@ -137,8 +121,8 @@ static void factorise(blw_l1_newton_t *at)
         (void)gather(self, m->n_groups - 1U, &m->G[k], m->n, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[at->free]);
         Lr[at->free + k] = -DAMPING / m->P[blw_la_packed_row(k) + k];
-        blw_l1_reduce_row_of_G(self, at->free, at->free + k);
     }
+    at->weak = blw_l1_factor(self, at->free, at->free + m->n, PIVOT2_MIN);
 }
 
 /* v = zeta - W l - G x - D l. */

@@ -95,8 +95,8 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     text = text.replace(f"BLW_{name.upper()}_{method}_", f"BLW_{name.upper()}_{method.upper()}_")
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
-               "l1_kkt", "l1_newton", "l1_newton_step", "l1_refine", "l1_support", "l1_tableau",
-               "guard", "guard_S",
+               "l1_factor", "l1_kkt", "l1_newton", "l1_newton_step", "l1_refine", "l1_support",
+               "l1_tableau", "guard", "guard_S",
                "guard_beside", "guard_bound", "guard_check", "guard_filters", "guard_gross",
                "guard_relax", "guard_search", "guard_solve"]
     sources = [ROOT / "lib" / "src" / f"blw_{module}.c" for module in modules]

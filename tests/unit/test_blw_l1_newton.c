@@ -117,7 +117,7 @@ static void test_solve_given_a_gross_outlier_loses_no_accuracy(void)
     check_attacked(zeta);
 }
 
-static void test_solve_given_the_same_data_again_gives_the_same_bits(void)
+static void test_solve_given_the_same_data_after_a_reset_gives_the_same_bits(void)
 {
     blw_real_t before[STATES];
 
@@ -129,9 +129,39 @@ static void test_solve_given_the_same_data_again_gives_the_same_bits(void)
         other[i] += BLW_R(30.0);
         blw_l1_solve(&l1, other, x, &info);
         TEST_ASSERT_TRUE(info.converged);
+        check_attacked(attacked);
     }
+    blw_l1_reset(&l1);
     check_attacked(attacked);
     TEST_ASSERT_EQUAL_MEMORY(before, x, sizeof x);
+}
+
+static void test_solve_given_an_attack_that_lasts_takes_fewer_steps(void)
+{
+    blw_real_t zeta[N];
+
+    blw_la_copy(N, attacked, zeta);
+    zeta[8] = BLW_R(9e5);
+    check_attacked(zeta);
+    const uint16_t cold = info.iterations;
+    zeta[8] += BLW_R(0.5);
+    check_attacked(zeta);
+    TEST_ASSERT_LESS_THAN_UINT16(cold, info.iterations);
+}
+
+static void test_solve_given_an_attack_that_has_ended_starts_afresh(void)
+{
+    const blw_real_t zeta[N] = {BLW_R(0.0), BLW_R(0.0), BLW_R(4.0),  BLW_R(0.0), BLW_R(0.0),
+                                BLW_R(5.0), BLW_R(0.0), BLW_R(30.0), BLW_R(4.5)};
+    blw_real_t       fresh[STATES];
+
+    blw_l1_solve(&l1, zeta, fresh, &info);
+    TEST_ASSERT_TRUE(info.converged);
+    blw_l1_reset(&l1);
+    check_attacked(attacked);
+    blw_l1_solve(&l1, zeta, x, &info);
+    TEST_ASSERT_TRUE(info.converged);
+    TEST_ASSERT_EQUAL_MEMORY(fresh, x, sizeof x);
 }
 
 static void test_solve_given_too_few_steps_says_so_with_a_bound(void)
@@ -203,7 +233,9 @@ int main(void)
     RUN_TEST(test_solve_given_agreeing_rows_returns_the_linear_fusion);
     RUN_TEST(test_solve_given_outliers_clips_pair_and_row);
     RUN_TEST(test_solve_given_a_gross_outlier_loses_no_accuracy);
-    RUN_TEST(test_solve_given_the_same_data_again_gives_the_same_bits);
+    RUN_TEST(test_solve_given_the_same_data_after_a_reset_gives_the_same_bits);
+    RUN_TEST(test_solve_given_an_attack_that_lasts_takes_fewer_steps);
+    RUN_TEST(test_solve_given_an_attack_that_has_ended_starts_afresh);
     RUN_TEST(test_solve_given_too_few_steps_says_so_with_a_bound);
     RUN_TEST(test_solve_given_a_singular_W_does_not_certify);
     RUN_TEST(test_solve_given_a_table_that_is_not_a_number_does_not_certify);

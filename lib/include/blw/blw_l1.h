@@ -106,7 +106,8 @@ typedef struct blw_l1 {
     blw_real_t           *L;      /* packed lower: L L' = Z_A Z_A', plus curvature of pairs; or T */
     const blw_real_t     *T;      /* tableau: S while nothing was swept, then L */
     blw_real_t           *A;      /* [n_groups] groups of the support in the order of L: small
-                                     integers, exact in blw_real_t */
+                                     integers, exact in blw_real_t; newton: |nu_g| where it is
+                                     gross, else 0 */
     uint16_t              n_A;    /* groups in A */
     uint16_t              rows;   /* rows of the groups in A = order of L */
     bool                  solved; /* whether tau is the solution of the last problem */
