@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -106,6 +107,20 @@ def test_design_given_same_model_twice_writes_the_same_bytes(tmp_path):
         files = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
     assert design(MODELS / "liu5.toml", "--out", "again", cwd=tmp_path).returncode == 0
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "again").iterdir()}
+
+
+def test_design_given_small_leaves_out_code_and_nothing_else(tmp_path):
+    for out, options in (("fast", []), ("small", ["--small"])):
+        assert design(MODELS / "liu5.toml", "--out", out, "--method", "lasso", *options,
+                      cwd=tmp_path).returncode == 0
+    fast, small = ((tmp_path / out / "liu5_model.c").read_text() for out in ("fast", "small"))
+    assert "static void" in fast and "static bool" in fast
+    assert "static void" not in small and "static bool" not in small
+    assert re.search(r"\.fast += NULL", small) and re.search(r"\.step += NULL", small)
+    tables = [re.findall(r"\[\d+\] = \{|crc +=.*", text) for text in (fast, small)]
+    assert tables[0] == tables[1]
+    for name in ("liu5.json", "liu5_model.h", "liu5.dbc"):
+        assert (tmp_path / "fast" / name).read_bytes() == (tmp_path / "small" / name).read_bytes()
 
 
 def test_design_given_json_prints_the_figures(tmp_path):

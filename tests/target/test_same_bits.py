@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from emulated import available, prepared
 
-from blw.cost import programs
+from blw.cost import measure, programs
 from blw.cost.programs import Program
 
 STEPS = 10_000
@@ -46,6 +46,14 @@ def test_replay_given_attacked_steps_yields_the_bits_of_the_host(target, method,
     assert len(there) == len(host) == steps
     assert np.all(host["status"] == 0)
     assert there.tobytes() == host.tobytes(), first_difference(host, there)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_replay_given_a_build_for_size_yields_the_bits_of_the_host(method):
+    model = METHODS[method]
+    small = outputs(Program.on(available("m4f"), model, method, measure.SMALL), STEPS)
+    host = on_host(model, method, STEPS, "f32")
+    assert small.tobytes() == host.tobytes(), first_difference(host, small)
 
 
 @pytest.mark.parametrize("method", METHODS)

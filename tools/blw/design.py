@@ -4,7 +4,7 @@
 import json
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,6 +123,12 @@ def plant_tables(model: Model, kalman: "Kalman") -> Struct:
         "y_max": table(np.clip(high, -largest, largest), "[m] a sample above is missing"),
         "x0": table(model.x0, "[n] x_hat(0)"),
     })
+
+
+def small(design: Design) -> Design:
+    """The same without straight-line code: less flash, more instructions, the same bits."""
+    return replace(design, methods={name: replace(designed, tables=designed.tables.bare())
+                                    for name, designed in design.methods.items()})
 
 
 def document(design: Design) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import click
 
 from blw import dbc, kalman
 from blw.atomic import write_files
-from blw.design import Design, design_all, document, json_text
+from blw.design import Design, design_all, document, json_text, small
 from blw.emit_c import files
 from blw.errors import DesignError
 from blw.model import load
@@ -22,8 +22,12 @@ from blw.progress import steps
 @click.option("--method", "methods", multiple=True, metavar="METHOD",
               help="Method to design beside kalman; may be repeated.  Default: all that accept "
                    "the model.")
+@click.option("--small", "is_small", is_flag=True,
+              help="Leave straight-line code out of NAME_model.c: less flash, more instructions, "
+                   "the same bits.")
 @click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON.")
-def design(model: Path, out: Path, methods: tuple[str, ...], as_json: bool) -> None:
+def design(model: Path, out: Path, methods: tuple[str, ...], is_small: bool,
+           as_json: bool) -> None:
     """Compute the tables of MODEL (a TOML file) for the library and the simulator."""
     with steps("design") as progress:
         # the simulator shows every method beside the Kalman filter
@@ -34,7 +38,8 @@ def design(model: Path, out: Path, methods: tuple[str, ...], as_json: bool) -> N
         raise DesignError(f"{model}: no method accepts this model: {reasons}")
     text = json_text(document(result))
     name = result.model.name
-    written = write_files(out, {f"{name}.json": text, **files(result),
+    written = write_files(out, {f"{name}.json": text,
+                                **files(small(result) if is_small else result),
                                 f"{name}.dbc": dbc.text(result.model)})
     summary = _summary(result, written)
     click.echo(json_text(summary) if as_json else _text(result, written), nl=not as_json)

@@ -126,6 +126,11 @@ class Struct:
         for name, value in self.members.items():
             yield from _walk(f"{path}.{name}", value)
 
+    def bare(self) -> "Struct":
+        """The same without straight-line code: the loops of the library do what it did."""
+        return Struct(self.ctype, self.suffix,
+                      {name: _bare(value) for name, value in self.members.items()}, self.method)
+
     def check(self) -> None:
         """Raise DesignError naming the first number that is not finite or overflows float32."""
         for path, values in self.named_reals(self.suffix):
@@ -134,6 +139,15 @@ class Struct:
                 entry = f"{path}[{bad[0]}]" if values.size > 1 else path
                 raise DesignError(f"table {entry} = {values[bad[0]]:.6g} does not fit float32; "
                                   "scale the units of the model")
+
+
+def _bare(value: Member) -> Member:
+    if isinstance(value, list):
+        return [item.bare() for item in value]
+    if isinstance(value, Struct):
+        only_code = all(isinstance(member, Code) for member in value.members.values())
+        return None if only_code else value.bare()
+    return None if isinstance(value, Code) else value
 
 
 def _flush(values: NDArray[np.float64]) -> NDArray[np.float64]:

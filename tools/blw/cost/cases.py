@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from blw import kalman
 from blw.atomic import write_changed, write_files
 from blw.build import BUILD, ROOT, StepFailed, simulator
-from blw.design import Design, design_all, document, json_text
+from blw.design import Design, design_all, document, json_text, small
 from blw.emit_c import files
 from blw.errors import BulwarkError
 from blw.model import load
@@ -27,6 +27,9 @@ from blw.options import suggestion
 #: and all the others are attacked.  A method that warms up for longer settles for a multiple.
 SETTLING_STEPS = 50
 BENIGN_STEPS = 50
+
+#: Folder in that of a case: the same without straight-line code.
+SMALL = "small"
 
 FOLDER = BUILD / "cost"
 HOST_SIM = ROOT / "host_sim"
@@ -105,6 +108,7 @@ def prepare(case: Case, steps: int | None = None) -> Prepared:
     folder = FOLDER / "cases" / case.name
     lines = [f"blw_add_replay({case.name} {method} {owner(design, method)})"
              for method in design.methods]
+    write_changed(folder / SMALL, files(small(design)))
     write_changed(folder, {**files(design), "replays.cmake": "\n".join(lines) + "\n"})
     return Prepared(case, design, simulate(case, design, steps), folder)
 

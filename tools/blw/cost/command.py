@@ -31,6 +31,8 @@ def _shared_options(command: Callable[..., None]) -> Callable[..., None]:
                      help=f"One of {', '.join(cases.CASES)}; may be repeated.  Default: all."),
         click.option("--method", "methods", multiple=True, metavar="METHOD",
                      help="May be repeated.  Default: all that accept the model."),
+        click.option("--small", "is_small", is_flag=True,
+                     help="Built for size (-Os), models as `design --small` writes them."),
         click.option("--json", "as_json", is_flag=True, help="Print the figures as JSON."),
     )):
         command = option(command)
@@ -41,7 +43,7 @@ def _shared_options(command: Callable[..., None]) -> Callable[..., None]:
 @_shared_options
 @click.option("--write", "path", type=click.Path(path_type=Path, dir_okay=False),
               help="Also write the figures into this file, as docs/cost.md has them.")
-def bench(as_json: bool, path: Path | None, **names: Names) -> None:
+def bench(as_json: bool, path: Path | None, **names: Any) -> None:
     """Measure executed instructions per step, flash, RAM and worst-case stack of every method.
 
     Typical is the median of 50 steps without attack, attacked the mean of 200 attacked steps, worst
@@ -53,23 +55,26 @@ def bench(as_json: bool, path: Path | None, **names: Names) -> None:
                      disable=None))
     if path:
         contracted = contraction.measure(plan, rows)
-        write_files(path.parent, {path.name: document.text(rows, contracted, plan.refused)})
+        content = document.text(rows, contracted, measure.small(plan), plan.refused)
+        write_files(path.parent, {path.name: content})
     _print(rows, plan, WORK | SIZES, as_json)
 
 
 @click.command(short_help="Flash, RAM and stack per method.")
 @_shared_options
-def size(as_json: bool, **names: Names) -> None:
+def size(as_json: bool, **names: Any) -> None:
     """Tell flash, RAM and worst-case stack of every method, without running anything."""
     plan = _plan(**names)
     _print(list(measure.sizes(plan)), plan, SIZES, as_json)
 
 
-def _plan(target_names: Names, model_names: Names, methods: Names) -> measure.Bench:
+def _plan(target_names: Names, model_names: Names, methods: Names,
+          is_small: bool) -> measure.Bench:
     for method in methods:
         if method not in REGISTRY:
             raise BulwarkError(f"unknown method '{method}'; {suggestion(method, REGISTRY)}")
-    return measure.plan(cases.named(model_names), targets.named(target_names), methods)
+    return measure.plan(cases.named(model_names), targets.named(target_names), methods,
+                        measure.SMALL if is_small else "")
 
 
 def _print(rows: list[dict[str, Any]], plan: measure.Bench, columns: dict[str, str],

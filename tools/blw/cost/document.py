@@ -55,15 +55,22 @@ N = 15, its unit diagonal left out.
 |---|---:|---:|---:|---:|"""
 
 
+SMALL = """## Built for size
+The library with -Os, and a model that `tools/bulwark design --small` wrote: without straight-line
+code. The bits are the same. {title}, {model}; `tools/bulwark bench --small` tells it of the others.
+"""
+
+
 def text(rows: Sequence[dict[str, Any]], contracted: Sequence[dict[str, Any]],
-         refused: Sequence[dict[str, str]]) -> str:
-    """The document.  contracted: as contraction.measure() returns it."""
+         small: Sequence[dict[str, Any]], refused: Sequence[dict[str, str]]) -> str:
+    """The document.  contracted: as contraction.measure() returns it; small: rows, too."""
     lines = [HEAD]
     for target in dict.fromkeys(row["target"] for row in rows):
         own = [row for row in rows if row["target"] == target]
-        columns = [key for key in COLUMNS if any(row[key] is not None for row in own)]
-        lines += [f"## {TARGETS[target].title}", *_table_head(columns),
-                  *(line(row, columns) for row in own), ""]
+        lines += [f"## {TARGETS[target].title}", *_table(own)]
+    if small:
+        title = TARGETS[small[0]["target"]].title
+        lines += [SMALL.format(title=title, model=small[0]["model"]), *_table(small)]
     if contracted:
         lines += [CONTRACTION, *map(_contracted_line, contracted), ""]
     lines += ["## Refused", *(f"- {one['model']}, `{one['method']}`: {one['reason']}"
@@ -85,6 +92,11 @@ def figure(number: float | None) -> str:
 def _contracted_line(row: dict[str, Any]) -> str:
     figures = " | ".join(map(figure, row["instructions"] + row["cycles"]))
     return f"| `{row['what']}` | {figures} |"
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    columns = [key for key in COLUMNS if any(row[key] is not None for row in rows)]
+    return [*_table_head(columns), *(line(row, columns) for row in rows), ""]
 
 
 def _table_head(columns: Sequence[str]) -> list[str]:

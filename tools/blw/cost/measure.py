@@ -4,7 +4,7 @@
 import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,10 @@ from blw.cost.sizes import flash_bytes, ram_bytes
 from blw.cost.stack import stack_bytes
 from blw.cost.targets import ICOUNT, Target
 
+#: Built for size and without straight-line code; of this core and model the document tells it.
+SMALL = ".small"
+SMALL_EXAMPLE = ("m4f", "liu5")
+
 
 @dataclass(frozen=True, eq=False)
 class Bench:
@@ -28,18 +32,27 @@ class Bench:
     refused: list[dict[str, str]]
 
 
-def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str]) -> Bench:
+def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str],
+         variant: str = "") -> Bench:
     """Design the cases and build the programs of all targets; without methods, of every one that
-    accepts the model."""
+    accepts the model.  variant: as port/replay/CMakeLists.txt has them, behind a dot."""
     prepared = {case.name: prepare(case) for case in cases}
     refused = [{"model": name, "method": method, "reason": reason}
                for name, one in prepared.items() for method, reason in one.design.refused.items()
                if not methods or method in methods]
-    wanted = [Program.on(target, name, method) for target in targets
+    wanted = [Program.on(target, name, method, variant) for target in targets
               for name, one in prepared.items() for method in one.design.methods
               if not methods or method in methods]
     programs.build(wanted)
     return Bench(prepared, wanted, refused)
+
+
+def small(bench: Bench) -> list[dict[str, Any]]:
+    """Rows of one model on one core, as they are if built for size."""
+    wanted = [replace(program, variant=SMALL) for program in bench.programs
+              if (program.target.name, program.model) == SMALL_EXAMPLE]
+    programs.build(wanted)
+    return list(measure(replace(bench, programs=wanted)))
 
 
 def sizes(bench: Bench) -> Iterator[dict[str, Any]]:

@@ -45,6 +45,14 @@ class Program:
         return BUILD / self.preset / "port" / "replay" / self.name
 
     @property
+    def archives(self) -> tuple[str, str]:
+        """CMake's names of the library and of the model that are linked."""
+        if not self.variant:
+            return "blw", f"blw_model_{self.model}"
+        library = f"blw_{self.variant[1:]}"
+        return library, f"{library}_{self.model}"
+
+    @property
     def map(self) -> Path:
         """What the linker says about it."""
         return self.path.with_name(f"{self.name}.map")

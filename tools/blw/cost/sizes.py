@@ -12,26 +12,26 @@ from blw.cost.programs import Program
 
 _SECTION = re.compile(r"^ \.(text|rodata|data\.rel\.ro)\S*\s+0x[0-9a-f]+\s+0x([0-9a-f]+) (\S+)$",
                       re.MULTILINE)
-_OURS = re.compile(r"libblw(_model_\w+)?\.a\(")
-_LIBRARY_OBJECT = re.compile(r"libblw\.a\((\w+\.c)\.")
 _STORAGE = ("estimator", "estimator_mem")
 
 
 def flash_bytes(program: Program) -> int:
     """Code and tables of the estimator that is linked into the program."""
-    return sum(size for _, size, owner in _sections(program) if _OURS.search(owner))
+    return sum(size for _, size, owner in _sections(program)
+               if any(f"lib{archive}.a(" in owner for archive in program.archives))
 
 
 def table_bytes(program: Program) -> int:
     """The tables of the model alone."""
     return sum(size for kind, size, owner in _sections(program)
-               if kind != "text" and f"libblw_model_{program.model}.a(" in owner)
+               if kind != "text" and f"lib{program.archives[1]}.a(" in owner)
 
 
 def linked_objects(program: Program) -> set[str]:
     """The sources of the library of which the linker kept something."""
+    member = re.compile(rf"lib{program.archives[0]}\.a\((\w+\.c)\.")
     owners = (owner for _, _, owner in _sections(program))
-    return {found[1] for found in map(_LIBRARY_OBJECT.search, owners) if found}
+    return {found[1] for found in map(member.search, owners) if found}
 
 
 def _sections(program: Program) -> list[tuple[str, int, str]]:

@@ -73,8 +73,10 @@ def stack_bytes(program: Program, owner: str) -> int:
     symbols = _said(program, "nm", "-S")
     graph = CallGraph()
     replays = BUILD / program.preset / "port" / "replay" / "CMakeFiles"
-    kernels = _add_compiled(graph, replays / f"blw_model_{program.model}.dir")
-    library = _add_compiled(graph, BUILD / program.preset / "lib" / "CMakeFiles" / "blw.dir")
+    whole, model = (f"{archive}.dir" for archive in program.archives)
+    folder = replays if program.variant else BUILD / program.preset / "lib" / "CMakeFiles"
+    kernels = _add_compiled(graph, replays / model)
+    library = _add_compiled(graph, folder / whole)
     linked = {line.split()[-1] for line in symbols.splitlines()}
     graph.frames[_POINTER] = 0
     graph.calls[_POINTER] = {name for name in kernels if name.rpartition(":")[2] in linked}
