@@ -24,6 +24,7 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_filters.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_search.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_solve.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_strips.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_joint.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_joint_check.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_joint_recursive.c

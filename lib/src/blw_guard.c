@@ -123,7 +123,7 @@ static void move_reference(blw_guard_t *self, const blw_real_t *tau)
     const size_t                   N     = (size_t)model->head.plant->m * model->r;
 
     blw_la_fill(n, BLW_R(0.0), self->d);
-    guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
+    blw_guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
     blw_la_copy(n, self->x_bar, self->x_ref);
     if (n_u == n) {
         blw_la_axpy(n, BLW_R(1.0), self->d, self->x_ref);
@@ -134,7 +134,7 @@ static void move_reference(blw_guard_t *self, const blw_real_t *tau)
         self->d[j] = -self->d[j];
     }
     if (n_u > 0U) {
-        guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
+        blw_guard_mul_t(n_u, N, 0U, N, model->Gu, self->d, self->e, self->eta);
     } else {
         blw_la_copy(N, self->e, self->eta);
     }
@@ -156,7 +156,7 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
     blw_la_copy(n, self->x_ref, self->x_hat);
     if (n_s > 0U) {
         blw_la_fill(n_s, BLW_R(0.0), self->d);
-        guard_mul(n_s, N, 0U, N, model->Sig, self->l, self->d);
+        blw_guard_mul(n_s, N, 0U, N, model->Sig, self->l, self->d);
         blw_la_gemv_add(n, n_s, model->Xs, self->d, self->x_hat);
     }
 }

@@ -27,7 +27,7 @@ void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau
         for (size_t a = model->rank[i]; a < r; a++) {
             l[row + a] = BLW_R(0.0);
         }
-        guard_both(r, row, S, &tau[row], tau, &l[row], l);
+        blw_guard_both(r, row, S, &tau[row], tau, &l[row], l);
         S += r * row;
         row += r;
     }
@@ -50,10 +50,10 @@ void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step)
         return;
     }
     if (i > 0U) {
-        guard_mul_t(r, i * r, 0U, i * r, rows_of(model, i), step, self->l, self->l);
+        blw_guard_mul_t(r, i * r, 0U, i * r, rows_of(model, i), step, self->l, self->l);
     }
     for (size_t j = i + 1U; j < m; j++) {
-        guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &self->l[j * r]);
+        blw_guard_mul(r, j * r, i * r, r, rows_of(model, j), step, &self->l[j * r]);
     }
 }
 
@@ -83,9 +83,9 @@ void blw_guard_couple(const blw_guard_model_t *model, size_t i, size_t j, const 
     const size_t r = model->r;
 
     if (j < i) {
-        guard_mul(r, i * r, j * r, r, rows_of(model, i), x, y);
+        blw_guard_mul(r, i * r, j * r, r, rows_of(model, i), x, y);
     } else {
-        guard_mul_t(r, j * r, i * r, r, rows_of(model, j), x, y, y);
+        blw_guard_mul_t(r, j * r, i * r, r, rows_of(model, j), x, y, y);
     }
 }
 

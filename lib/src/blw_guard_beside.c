@@ -74,8 +74,8 @@ bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real
         before[a] = BLW_R(0.0);
         turned[a] = BLW_R(0.0);
     }
-    guard_mul(r, r, 0U, r, V, l, turned);
-    guard_mul(r, r, 0U, r, V, step, before);
+    blw_guard_mul(r, r, 0U, r, V, l, turned);
+    blw_guard_mul(r, r, 0U, r, V, step, before);
     for (size_t c = 0U; c < r; c++) {
         g[c] = turned[c] + (s[c] * before[c]);
         square += g[c] * g[c];
@@ -87,7 +87,7 @@ bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real
         before[c] = attacked ? (((mu * before[c]) - turned[c]) / (s[c] + mu)) : before[c];
         step[c]   = BLW_R(0.0);
     }
-    guard_mul_t(r, r, 0U, r, V, before, step, step);
+    blw_guard_mul_t(r, r, 0U, r, V, before, step, step);
     return attacked;
 }
 
@@ -100,9 +100,9 @@ void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const 
 
     blw_la_fill(r, BLW_R(0.0), turned);
     blw_la_fill(r, BLW_R(0.0), y);
-    guard_mul(r, r, 0U, r, V, x, turned);
+    blw_guard_mul(r, r, 0U, r, V, x, turned);
     for (size_t c = 0U; c < r; c++) {
         turned[c] = (s[c] > GUARD_PIVOT_MIN) ? (turned[c] / s[c]) : BLW_R(0.0);
     }
-    guard_mul_t(r, r, 0U, r, V, turned, y, y);
+    blw_guard_mul_t(r, r, 0U, r, V, turned, y, y);
 }

@@ -6,11 +6,12 @@
  * the minimiser is within |nu - nu*|_S^2 <= 2 gap, and with Gu x + W z = nu - nu*, x = Fu (nu - nu*):
  *     |x_hat - x*| <= kappa (2 f / k + omega (2 gap)^(1/2)) + sigma (2 gap)^(1/2),           (9)
  * because sum_i k |nu_i| and sum_i k |nu_i*| are both at most the objective f. */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
 /* sum_i k |nu_i| over the sensors with a penalty; *l_nu: sum_i l_i' nu_i. */
-static blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
+static BLW_COLD blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
 {
     const size_t r     = self->model->r;
     blw_real_t   total = BLW_R(0.0);
@@ -32,7 +33,7 @@ static blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
     return self->model->k * total;
 }
 
-blw_real_t blw_guard_bound(blw_guard_t *self)
+BLW_COLD blw_real_t blw_guard_bound(blw_guard_t *self)
 {
     const blw_guard_model_t *const model   = self->model;
     const size_t                   m       = model->head.plant->m;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* What a gross attack has left in a filter would leave its rounding in l = S e.  Where tau_i starts
  * makes no difference to the minimum of (2), so for such sensors it starts from 0, not from e_i. */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -31,7 +32,7 @@ blw_mask_t blw_guard_gross(blw_guard_t *self)
     return ((2U * count) <= m) ? set : 0U;
 }
 
-void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
+BLW_COLD void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   r     = model->r;
@@ -49,7 +50,7 @@ void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
 }
 
 /* |l_i|^2 at nu = 0 for a sensor of the set, whose h_i is in self->step. */
-static blw_real_t square_with(blw_guard_t *self, blw_mask_t set, size_t i)
+static BLW_COLD blw_real_t square_with(blw_guard_t *self, blw_mask_t set, size_t i)
 {
     const size_t r = self->model->r;
     size_t       j = 0U;
@@ -63,7 +64,7 @@ static blw_real_t square_with(blw_guard_t *self, blw_mask_t set, size_t i)
     return blw_la_dot(r, self->step, self->step);
 }
 
-blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
+BLW_COLD blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
 {
     const size_t r       = self->model->r;
     blw_mask_t   rest    = set;

@@ -41,8 +41,8 @@ blw_real_t blw_guard_step_alone(size_t r, blw_real_t k, const blw_real_t *l, con
 }
 
 /* Add step [r] to the sensor's own tau and l, and what it does to the l of the others. */
-static void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own,
-                   const blw_real_t *step)
+static BLW_COLD void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own,
+                            const blw_real_t *step)
 {
     const size_t r = self->model->r;
 
@@ -60,7 +60,7 @@ static void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_lo
 }
 
 /* (7).  @return |step| */
-static blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own)
+static BLW_COLD blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own)
 {
     const size_t      r    = self->model->r;
     blw_real_t *const step = self->turned;
@@ -73,7 +73,7 @@ static blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_lo
 }
 
 /* (11) for the last two sensors. */
-static void eliminate_two(blw_guard_t *self, blw_guard_some_t *some)
+static BLW_COLD void eliminate_two(blw_guard_t *self, blw_guard_some_t *some)
 {
     const size_t             r     = self->model->r;
     blw_guard_local_t *const first = &some->at[some->count - 2U];
@@ -97,7 +97,7 @@ static void eliminate_two(blw_guard_t *self, blw_guard_some_t *some)
 
 /* l_i = 0 for the excluded sensors; more than two, or two without pairs, get there step by step.
  * @return the largest step that is not exact. */
-static blw_real_t eliminate(blw_guard_t *self, blw_guard_some_t *some)
+static BLW_COLD blw_real_t eliminate(blw_guard_t *self, blw_guard_some_t *some)
 {
     blw_real_t largest = BLW_R(0.0);
 
@@ -118,7 +118,7 @@ static blw_real_t eliminate(blw_guard_t *self, blw_guard_some_t *some)
 }
 
 /* One step of every sensor.  @return the largest one. */
-static blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
+static BLW_COLD blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
 {
     blw_real_t largest = BLW_R(0.0);
 
@@ -129,7 +129,7 @@ static blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
 }
 
 /* Add `step` [r] to tau_i, with what that does to all l; attacked: nu_i /= 0 then. */
-static void move(blw_guard_t *self, size_t i, const blw_real_t *step, bool attacked)
+static BLW_COLD void move(blw_guard_t *self, size_t i, const blw_real_t *step, bool attacked)
 {
     const size_t r = self->model->r;
 
@@ -142,7 +142,7 @@ static void move(blw_guard_t *self, size_t i, const blw_real_t *step, bool attac
 }
 
 /* (7) for a sensor alone. */
-static void move_alone(blw_guard_t *self, const blw_guard_local_t *own)
+static BLW_COLD void move_alone(blw_guard_t *self, const blw_guard_local_t *own)
 {
     const size_t      r    = self->model->r;
     const size_t      row  = own->sensor * r;
@@ -154,8 +154,8 @@ static void move_alone(blw_guard_t *self, const blw_guard_local_t *own)
 }
 
 /* (10) for a sensor beside the one excluded. */
-static void move_beside(blw_guard_t *self, const blw_guard_local_t *own,
-                        const blw_guard_local_t *excluded)
+static BLW_COLD void move_beside(blw_guard_t *self, const blw_guard_local_t *own,
+                                 const blw_guard_local_t *excluded)
 {
     const size_t      r     = self->model->r;
     const size_t      i     = own->sensor;
@@ -180,7 +180,7 @@ static void move_beside(blw_guard_t *self, const blw_guard_local_t *own,
 }
 
 /* Give the sums of the steps to all sensors. */
-static void settle(blw_guard_t *self, const blw_guard_some_t *some)
+static BLW_COLD void settle(blw_guard_t *self, const blw_guard_some_t *some)
 {
     const size_t      r    = self->model->r;
     blw_real_t *const step = self->turned;
@@ -197,8 +197,8 @@ static void settle(blw_guard_t *self, const blw_guard_some_t *some)
 }
 
 /* Minimise (2) over the nu of the sensors in the list.  @return the number of sweeps. */
-static unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
-                      unsigned sweeps)
+static BLW_COLD unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
+                               unsigned sweeps)
 {
     const size_t r    = self->model->r;
     unsigned     done = 0U;
@@ -229,7 +229,8 @@ static unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tole
 }
 
 /* Put the sensors of a set at the end of the list.  @return false if they are too many. */
-static bool append(const blw_guard_t *self, blw_mask_t set, blw_real_t k, blw_guard_some_t *some)
+static BLW_COLD bool append(const blw_guard_t *self, blw_mask_t set, blw_real_t k,
+                            blw_guard_some_t *some)
 {
     const size_t most = (self->model->most < GUARD_SOME) ? self->model->most : GUARD_SOME;
     size_t       i    = 0U;
@@ -249,7 +250,7 @@ static bool append(const blw_guard_t *self, blw_mask_t set, blw_real_t k, blw_gu
     return true;
 }
 
-bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some)
+BLW_COLD bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some)
 {
     const blw_mask_t excluded = self->excluded;
     bool             room     = true;
@@ -277,8 +278,8 @@ blw_mask_t blw_guard_clipping(blw_guard_t *self)
     return set & ~(self->attacked | self->excluded);
 }
 
-bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
-                         unsigned limit)
+BLW_COLD bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
+                                  unsigned limit)
 {
     const unsigned count = (unsigned)some->count;
     const unsigned least = (count == 1U) ? 1U : (2U * count);
@@ -293,8 +294,9 @@ bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t t
     return true;
 }
 
-BLW_APART void blw_guard_move_together(blw_guard_t *self, blw_mask_t set, blw_mask_t smaller,
-                                       blw_real_t close, unsigned limit)
+BLW_COLD BLW_APART void blw_guard_move_together(blw_guard_t *self, blw_mask_t set,
+                                                blw_mask_t smaller, blw_real_t close,
+                                                unsigned limit)
 {
     blw_guard_some_t some;
 

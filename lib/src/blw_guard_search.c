@@ -10,7 +10,8 @@
 #define SHORTEST BLW_R(0.05)
 
 /* Row a of sensor i in S_II up to its diagonal. */
-static void gather_row(const blw_guard_t *self, blw_mask_t set, size_t i, size_t a, blw_real_t *to)
+static BLW_COLD void gather_row(const blw_guard_t *self, blw_mask_t set, size_t i, size_t a,
+                                blw_real_t *to)
 {
     const blw_guard_model_t *const model = self->model;
 
@@ -24,7 +25,7 @@ static void gather_row(const blw_guard_t *self, blw_mask_t set, size_t i, size_t
     to[a] = (a < model->rank[i]) ? BLW_R(1.0) : BLW_R(0.0);
 }
 
-size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
+BLW_COLD size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
 {
     size_t row = 0U;
 
@@ -37,7 +38,7 @@ size_t blw_guard_gather(const blw_guard_t *self, blw_mask_t set)
     return row;
 }
 
-void blw_guard_factor(const blw_guard_t *self, size_t rows)
+BLW_COLD void blw_guard_factor(const blw_guard_t *self, size_t rows)
 {
     for (size_t i = 0U; i < rows; i++) {
         blw_real_t *const Li = &self->L[blw_la_packed_row(i)];
@@ -52,7 +53,7 @@ void blw_guard_factor(const blw_guard_t *self, size_t rows)
     }
 }
 
-blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x)
+BLW_COLD blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x)
 {
     blw_real_t total = BLW_R(0.0);
 
@@ -65,7 +66,7 @@ blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x)
     return total;
 }
 
-void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x)
+BLW_COLD void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x)
 {
     for (size_t i = rows; i-- > 0U;) {
         const blw_real_t *const Li = &self->L[blw_la_packed_row(i)];
@@ -79,7 +80,7 @@ void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x)
 
 /* Right side l_i - k nu_i / |nu_i| of the Newton step for one sensor with a penalty, and its
  * curvature k (I - nu_i nu_i' / |nu_i|^2) / |nu_i| on the diagonal of S_II from `row` on. */
-static void add_penalty(const blw_guard_t *self, size_t i, size_t row, blw_real_t *right)
+static BLW_COLD void add_penalty(const blw_guard_t *self, size_t i, size_t row, blw_real_t *right)
 {
     const size_t            r     = self->model->r;
     const blw_real_t *const e     = &self->e[i * r];
@@ -102,7 +103,7 @@ static void add_penalty(const blw_guard_t *self, size_t i, size_t row, blw_real_
 }
 
 /* Whether nu_i keeps its side, and its length by and large, if `step` is added to it. */
-static bool within_reach(const blw_guard_t *self, size_t i, const blw_real_t *step)
+static BLW_COLD bool within_reach(const blw_guard_t *self, size_t i, const blw_real_t *step)
 {
     const size_t            r      = self->model->r;
     const blw_real_t *const e      = &self->e[i * r];
@@ -120,7 +121,7 @@ static bool within_reach(const blw_guard_t *self, size_t i, const blw_real_t *st
 }
 
 /* The Newton step into self->step.  @return whether it is within reach. */
-static BLW_APART bool find_step(blw_guard_t *self, blw_mask_t set)
+static BLW_COLD BLW_APART bool find_step(blw_guard_t *self, blw_mask_t set)
 {
     const size_t r    = self->model->r;
     const size_t m    = self->model->head.plant->m;
@@ -151,7 +152,7 @@ static BLW_APART bool find_step(blw_guard_t *self, blw_mask_t set)
     return good;
 }
 
-bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
+BLW_COLD bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   r     = model->r;
@@ -175,7 +176,7 @@ bool blw_guard_newton(blw_guard_t *self, blw_mask_t set)
 }
 
 /* The largest |h_i| of the sensors outside a set, 0 if there is none; and whose it is. */
-static blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
+static BLW_COLD blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_t *sensor)
 {
     const size_t m       = self->model->head.plant->m;
     blw_real_t   largest = BLW_R(0.0);
@@ -191,7 +192,7 @@ static blw_real_t largest_outside(const blw_guard_t *self, blw_mask_t set, size_
 }
 
 /* Sensors of the unit of sensor i. */
-static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
+static BLW_COLD blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
 {
     const size_t m   = model->head.plant->m;
     blw_mask_t   set = guard_bit(i);
@@ -202,7 +203,7 @@ static blw_mask_t unit_of(const blw_guard_model_t *model, size_t i)
     return set;
 }
 
-bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin)
+BLW_COLD bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin)
 {
     blw_real_t least = BLW_REAL_MAX;         /* inside */
     blw_real_t most  = self->model->exclude; /* outside */
@@ -222,7 +223,7 @@ bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t ma
     return (least - most) > margin;
 }
 
-blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear)
+BLW_COLD blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *clear)
 {
     const blw_guard_model_t *const model  = self->model;
     const size_t                   p      = model->head.plant->p;
@@ -241,7 +242,7 @@ blw_mask_t blw_guard_choose(const blw_guard_t *self, blw_real_t margin, bool *cl
 }
 
 /* Sensors of the units in `units`. */
-static blw_mask_t sensors_of(const blw_guard_model_t *model, blw_mask_t units)
+static BLW_COLD blw_mask_t sensors_of(const blw_guard_model_t *model, blw_mask_t units)
 {
     blw_mask_t sensors = 0U;
 
@@ -252,7 +253,7 @@ static blw_mask_t sensors_of(const blw_guard_model_t *model, blw_mask_t units)
 }
 
 /* The next larger number with as many bits set; units /= 0. */
-static blw_mask_t next_of_same_size(blw_mask_t units)
+static BLW_COLD blw_mask_t next_of_same_size(blw_mask_t units)
 {
     const blw_mask_t low    = units & (~units + 1U);
     const blw_mask_t ripple = units + low;
@@ -261,7 +262,7 @@ static blw_mask_t next_of_same_size(blw_mask_t units)
 }
 
 /* (6) for two sensors with V and s: |l_j|^2 + g' (S_ii - S_ij S_ji)^-1 g, g = l_i - S_ij l_j. */
-static blw_real_t explained_by_two(const blw_guard_t *self, size_t i, size_t j)
+static BLW_COLD blw_real_t explained_by_two(const blw_guard_t *self, size_t i, size_t j)
 {
     const size_t            r    = self->model->r;
     const blw_real_t *const l_j  = &self->l[j * r];
@@ -279,7 +280,7 @@ static blw_real_t explained_by_two(const blw_guard_t *self, size_t i, size_t j)
 }
 
 /* (6) for one set. */
-static blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
+static BLW_COLD blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
 {
     const size_t     r  = self->model->r;
     blw_real_t      *to = self->step;
@@ -300,7 +301,7 @@ static blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
     return blw_guard_reduce(self, rows, self->step);
 }
 
-blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known)
+BLW_COLD blw_mask_t blw_guard_search(blw_guard_t *self, blw_mask_t known)
 {
     const blw_guard_model_t *const model = self->model;
     const blw_mask_t               all   = BLW_MASK_ALL(model->n_units);

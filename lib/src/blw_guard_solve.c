@@ -54,7 +54,7 @@ static void note_step(descent_t *descent, size_t i, blw_real_t length)
 }
 
 /* The largest step where no sensor has nu_i, from all |h_i|. */
-static void note_clipping(const blw_guard_t *self, descent_t *descent)
+static BLW_COLD void note_clipping(const blw_guard_t *self, descent_t *descent)
 {
     const blw_real_t k = self->model->k;
 
@@ -69,7 +69,7 @@ static void note_clipping(const blw_guard_t *self, descent_t *descent)
 }
 
 /* All |h_i|, and the largest step.  The step of an excluded sensor is -l_i. */
-static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
+static BLW_COLD BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 {
     const size_t     r        = self->model->r;
     const blw_real_t k        = self->model->k;
@@ -103,7 +103,7 @@ static BLW_APART void survey(blw_guard_t *self, descent_t *descent)
 }
 
 /* Block updates that a joint step on some sensors counts as: its spreads, and its factorisation. */
-static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
+static BLW_COLD unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 {
     const unsigned m       = self->model->head.plant->m;
     const unsigned sensors = blw_mask_count(set);
@@ -115,7 +115,7 @@ static unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
 }
 
 /* Try a Newton step on a set of sensors.  @return whether anything was done. */
-static BLW_APART bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
+static BLW_COLD BLW_APART bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned limit)
 {
     const unsigned cost = self->updates + cost_of(self, set);
 
@@ -129,7 +129,7 @@ static BLW_APART bool update_jointly(blw_guard_t *self, blw_mask_t set, unsigned
 
 /* The sensors to move next: the support, the one with the largest step, and what clips beside them;
  * fewer if these are too many. */
-static void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_some_t *some)
+static BLW_COLD void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_some_t *some)
 {
     const blw_mask_t next    = guard_bit(descent->sensor);
     const blw_mask_t support = self->attacked | self->excluded;
@@ -143,7 +143,8 @@ static void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_som
 }
 
 /* Move those; fewer still if they do not move.  @return whether anything moved. */
-static BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent, blw_real_t close)
+static BLW_COLD BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent,
+                                         blw_real_t close)
 {
     const unsigned   limit = descent->limit - LOOK;
     blw_guard_some_t some;
@@ -157,7 +158,7 @@ static BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent, blw
 }
 
 /* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
-static BLW_APART bool update(blw_guard_t *self, descent_t *descent)
+static BLW_COLD BLW_APART bool update(blw_guard_t *self, descent_t *descent)
 {
     const blw_real_t k       = self->model->k;
     const blw_mask_t next    = guard_bit(descent->sensor);
@@ -186,7 +187,7 @@ static BLW_APART bool update(blw_guard_t *self, descent_t *descent)
 
 /* Descend until nothing moves, the choice is clear, or the limit is reached.  @return whether
  * nothing moves. */
-static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
+static BLW_COLD bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
 {
     const blw_real_t k       = self->model->k;
     bool             clear   = false;
@@ -220,7 +221,7 @@ static bool descend(blw_guard_t *self, unsigned limit, descent_t *descent)
 }
 
 /* l_I = 0 for the excluded sensors I, together with what else has nu_i /= 0. */
-static BLW_APART void eliminate(blw_guard_t *self, unsigned limit)
+static BLW_COLD BLW_APART void eliminate(blw_guard_t *self, unsigned limit)
 {
     if (!blw_guard_exact(self, blw_mask_count(self->excluded))) {
         (void)blw_guard_newton(self, self->excluded);
@@ -233,7 +234,7 @@ static BLW_APART void eliminate(blw_guard_t *self, unsigned limit)
 
 /* Solve for what clips beside the excluded sensors, if these stand out; for the one that clips most
  * if the limit allows no more. */
-static BLW_APART void move_clipping(blw_guard_t *self, unsigned limit)
+static BLW_COLD BLW_APART void move_clipping(blw_guard_t *self, unsigned limit)
 {
     const blw_mask_t more = blw_guard_clipping(self);
     size_t           most = 0U;
@@ -257,7 +258,7 @@ static BLW_APART void move_clipping(blw_guard_t *self, unsigned limit)
 }
 
 /* Updates that eliminate() takes at least. */
-static unsigned elimination_cost(const blw_guard_t *self, blw_mask_t set)
+static BLW_COLD unsigned elimination_cost(const blw_guard_t *self, blw_mask_t set)
 {
     const unsigned count = blw_mask_count(set);
 
@@ -269,7 +270,8 @@ static unsigned elimination_cost(const blw_guard_t *self, blw_mask_t set)
 
 /* Solve on without the sensors of a set.  Unless l_I = 0 is kept all the time, the work for that is
  * kept back, since (8) would not hold otherwise. */
-static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, descent_t *descent)
+static BLW_COLD bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit,
+                                     descent_t *descent)
 {
     const unsigned cost = elimination_cost(self, set);
     const unsigned kept = blw_guard_exact(self, blw_mask_count(set)) ? 0U : cost;
@@ -292,7 +294,8 @@ static bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned limit, d
 
 /* Exclude what stands out, and see whether it still does; else leave the choice to the first descent,
  * which may start from anywhere. */
-static BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit, descent_t *descent)
+static BLW_COLD BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit,
+                                               descent_t *descent)
 {
     const blw_real_t margin = AT_ONCE * self->model->k;
     bool             clear  = false;
@@ -320,8 +323,8 @@ static BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit, descent
 }
 
 /* The first descent, and what it excludes.  @return that set. */
-static BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, descent_t *descent,
-                                          bool *converged)
+static BLW_COLD BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned limit,
+                                                   descent_t *descent, bool *converged)
 {
     const unsigned most  = self->model->max_updates;
     blw_mask_t     set   = 0U;
@@ -346,7 +349,7 @@ static BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned limit, des
 }
 
 /* Where the first descent starts. */
-static void start(blw_guard_t *self, descent_t *descent)
+static BLW_COLD void start(blw_guard_t *self, descent_t *descent)
 {
     const blw_guard_model_t *const model = self->model;
 
@@ -359,7 +362,7 @@ static void start(blw_guard_t *self, descent_t *descent)
     descent->fresh = true;
 }
 
-blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
+BLW_COLD blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
     const unsigned                 most    = model->max_updates;

@@ -9,7 +9,7 @@ from c_library import CLibrary, common_layouts, compile_method
 
 MODULES = ("blw_guard", "blw_guard_check", "blw_guard_search", "blw_guard_solve",
            "blw_guard_beside", "blw_guard_gross", "blw_guard_relax", "blw_guard_bound",
-           "blw_guard_filters", "blw_guard_S")
+           "blw_guard_filters", "blw_guard_S", "blw_guard_strips")
 METHOD_GUARD = 7
 
 
