@@ -16,12 +16,14 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_decentral_steady.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_S.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_alone.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_beside.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_gross.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_relax.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_bound.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_check.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_filters.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_one.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_search.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_solve.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_guard_strips.c

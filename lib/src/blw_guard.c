@@ -252,7 +252,7 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
         fuse(self, self->e);
         return;
     }
-    out->bound = blw_guard_solve(self, &converged);
+    out->bound = model->solver->solve(self, &converged);
     if (!(out->bound <= BLW_REAL_MAX)) { /* only at the limit of the numbers */
         out->bound = BLW_REAL_MAX;
         converged  = false;

@@ -56,14 +56,15 @@ static const blw_real_t *spectrum(const blw_guard_model_t *model, size_t i, size
     return &model->V[at * r * r];
 }
 
-bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real_t *l,
-                           const blw_real_t *tau, blw_real_t *step)
+/* The step [r] of tau_i to (10), where l_j = 0.  @return whether nu_i /= 0 then. */
+static bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
 {
     const size_t            r      = self->model->r;
     const blw_real_t        k      = self->model->k;
     const blw_real_t       *s      = NULL;
     const blw_real_t *const V      = spectrum(self->model, i, j, &s);
     const blw_real_t *const e      = &self->e[i * r];
+    const blw_real_t *const tau    = &self->eta[i * r];
     blw_real_t *const       before = &self->turned[r];      /* V nu_i */
     blw_real_t *const       turned = &self->turned[2U * r]; /* V l_i */
     blw_real_t *const       g      = &self->turned[3U * r];
@@ -74,7 +75,7 @@ bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real
         before[a] = BLW_R(0.0);
         turned[a] = BLW_R(0.0);
     }
-    blw_guard_mul(r, r, 0U, r, V, l, turned);
+    blw_guard_mul(r, r, 0U, r, V, &self->l[i * r], turned);
     blw_guard_mul(r, r, 0U, r, V, step, before);
     for (size_t c = 0U; c < r; c++) {
         g[c] = turned[c] + (s[c] * before[c]);
@@ -89,6 +90,20 @@ bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real
     }
     blw_guard_mul_t(r, r, 0U, r, V, before, step, step);
     return attacked;
+}
+
+void blw_guard_move_beside(blw_guard_t *self, size_t i, size_t j)
+{
+    const size_t            r    = self->model->r;
+    const blw_real_t *const l    = &self->l[j * r];
+    blw_real_t *const       step = self->turned;
+
+    const bool attacked = step_beside(self, i, j, step);
+    blw_guard_move_to(self, i, step, attacked);
+    for (size_t a = 0U; a < r; a++) {
+        step[a] = -l[a];
+    }
+    blw_guard_move_to(self, j, step, true);
 }
 
 void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,

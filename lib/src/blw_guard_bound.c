@@ -33,25 +33,19 @@ static BLW_COLD blw_real_t penalty_of(const blw_guard_t *self, blw_real_t *l_nu)
     return self->model->k * total;
 }
 
-BLW_COLD blw_real_t blw_guard_bound(blw_guard_t *self)
+BLW_COLD blw_real_t blw_guard_bound(const blw_guard_t *self, blw_real_t largest)
 {
     const blw_guard_model_t *const model   = self->model;
     const size_t                   m       = model->head.plant->m;
-    blw_real_t                     largest = model->k * model->k; /* of k^2 and the |l_i|^2 */
     blw_real_t                     l_nu    = BLW_R(0.0);
-
-    blw_guard_squares(model, self->l, self->suspicion); /* which judge_sensors() sets later */
-    for (size_t i = 0U; i < m; i++) {
-        largest = blw_la_max(largest, self->suspicion[i]);
-    }
-    const blw_real_t t       = blw_la_sqrt((model->k * model->k) / largest);
-    const blw_real_t penalty = penalty_of(self, &l_nu);
-    const blw_real_t product = blw_la_dot(m * model->r, self->l, self->eta);
-    const blw_real_t energy  = BLW_R(0.5) * blw_la_max(BLW_R(0.0), product);
-    const blw_real_t rest    = BLW_R(1.0) - t;
-    const blw_real_t gap     = (rest * rest * energy) + (penalty - (t * l_nu));
-    const blw_real_t root    = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), gap));
-    const blw_real_t size    = (BLW_R(2.0) * (energy + penalty)) / model->k;
+    const blw_real_t               t       = model->k / blw_la_max(model->k, largest);
+    const blw_real_t               penalty = penalty_of(self, &l_nu);
+    const blw_real_t               product = blw_la_dot(m * model->r, self->l, self->eta);
+    const blw_real_t               energy  = BLW_R(0.5) * blw_la_max(BLW_R(0.0), product);
+    const blw_real_t               rest    = BLW_R(1.0) - t;
+    const blw_real_t               gap     = (rest * rest * energy) + (penalty - (t * l_nu));
+    const blw_real_t               root    = blw_la_sqrt(BLW_R(2.0) * blw_la_max(BLW_R(0.0), gap));
+    const blw_real_t               size    = (BLW_R(2.0) * (energy + penalty)) / model->k;
     const blw_real_t most = (model->kappa * (size + (model->omega * root))) + (model->sigma * root);
     const bool       none = (model->n_u > 0U) && !(model->kappa > BLW_R(0.0));
     return none ? BLW_REAL_MAX : most;

@@ -10,16 +10,20 @@ static bool sizes_ok(const blw_guard_model_t *model)
     return (model->r >= 1U) && (model->reach >= 1U) && (model->reach <= model->r)
            && (model->n_u <= plant->n) && (model->n_units <= plant->m)
            && (model->n_units > plant->p) && (model->most >= 1U) && (model->most <= plant->m)
-           && (model->search <= 2U) && (model->max_updates >= 1U) && (model->pairs <= 1U);
+           && (model->search <= 2U) && (model->max_updates >= 1U) && (model->pairs <= 1U)
+           && (model->solver != NULL);
 }
 
-/* Pairs are for single sensors only. */
+/* Pairs are for single sensors only, and one of the solvers for one liar with pairs. */
 static bool pairs_ok(const blw_guard_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
 
-    return (model->pairs == 0U)
-           || ((plant->p >= 1U) && (plant->p <= 2U) && (model->n_units == plant->m));
+    if (model->pairs == 0U) {
+        return !model->solver->single;
+    }
+    return (plant->p >= 1U) && (plant->p <= (model->solver->single ? 1U : 2U))
+           && (model->n_units == plant->m);
 }
 
 /* Every unit has a number below n_units, no p units hold more than `most` sensors, every rank is

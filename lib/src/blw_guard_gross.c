@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 /* What a gross attack has left in a filter would leave its rounding in l = S e.  Where tau_i starts
  * makes no difference to the minimum of (2), so for such sensors it starts from 0, not from e_i. */
-#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -32,7 +31,7 @@ blw_mask_t blw_guard_gross(blw_guard_t *self)
     return ((2U * count) <= m) ? set : 0U;
 }
 
-BLW_COLD void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
+void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
 {
     const blw_guard_model_t *const model = self->model;
     const size_t                   r     = model->r;
@@ -49,22 +48,7 @@ BLW_COLD void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
     self->attacked = set;
 }
 
-/* |l_i|^2 at nu = 0 for a sensor of the set, whose h_i is in self->step. */
-static BLW_COLD blw_real_t square_with(blw_guard_t *self, blw_mask_t set, size_t i)
-{
-    const size_t r = self->model->r;
-    size_t       j = 0U;
-
-    for (blw_mask_t rest = set; rest != 0U; rest >>= 1) {
-        if (((rest & 1U) != 0U) && (j != i)) {
-            blw_guard_couple(self->model, i, j, &self->e[j * r], self->step);
-        }
-        j++;
-    }
-    return blw_la_dot(r, self->step, self->step);
-}
-
-BLW_COLD blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
+blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
 {
     const size_t r       = self->model->r;
     blw_mask_t   rest    = set;
@@ -74,18 +58,16 @@ BLW_COLD blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set)
     blw_guard_start_without(self, set);
     blw_guard_squares(self->model, self->l, self->h);
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        const size_t row    = i * r;
-        blw_real_t   square = self->h[i];
+        const size_t row = i * r;
+        blw_real_t   h   = blw_la_sqrt(self->h[i]);
 
-        self->h[i] = blw_la_sqrt(square);
         if ((rest & 1U) != 0U) {
-            self->h[i] =
-                blw_guard_pull(r, &self->l[row], &self->e[row], &self->eta[row], self->step);
-            square = square_with(self, set, i);
+            h = blw_guard_pull(r, &self->l[row], &self->e[row], &self->eta[row], self->step);
         }
-        all += square;
-        largest = blw_la_max(largest, square);
+        self->h[i] = h;
+        all += h;
+        largest = blw_la_max(largest, h);
         rest >>= 1;
     }
-    return (all <= BLW_REAL_MAX) ? largest : all;
+    return (all <= BLW_REAL_MAX) ? (largest * largest) : all;
 }

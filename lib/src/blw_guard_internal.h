@@ -16,6 +16,33 @@
 /** |e_i| / k above which rounding in l would show. */
 #define GUARD_GROSS BLW_R(64.0)
 
+/** Largest |step| that ends the descent, relative to k: eps^(2/3), about. */
+#define GUARD_TOLERANCE ((BLW_REAL_EPS > BLW_R(1e-10)) ? BLW_R(3e-5) : BLW_R(3e-11))
+
+/** The units to exclude are beyond doubt if no |h_i| is nearer to where it would matter than this
+ *  many times the largest |step|. */
+#define GUARD_CLEAR BLW_R(8.0)
+
+/** Units are excluded at once if their |h_i| are larger than all others and than the threshold by
+ *  this many times k. */
+#define GUARD_AT_ONCE BLW_R(4.0)
+
+/** How a minimiser of (2) is found, and the bound on |x_hat - that of the minimiser|. */
+struct blw_guard_solver {
+    /** From e [N] and l = S e, or from tau and l as blw_guard_start_without() leaves them, and the
+     *  |h_i| there; tau is left in self->eta.  Fills h, attacked, excluded. */
+    blw_real_t (*solve)(blw_guard_t *self, bool *converged);
+    bool single; /* for p = 1 with pairs only */
+};
+
+/** What all sensors would do next. */
+typedef struct blw_guard_view {
+    blw_real_t pending; /* sum over the sensors of effect_i |step_i| */
+    blw_real_t largest; /* largest |step_i| */
+    size_t     sensor;  /* whose it is */
+    blw_real_t l;       /* largest |l_i| */
+} blw_guard_view_t;
+
 /** A sensor among some that move together. */
 typedef struct blw_guard_local {
     size_t      sensor;
@@ -53,23 +80,31 @@ blw_status_t blw_guard_check(const blw_guard_model_t *model);
 blw_mask_t blw_guard_gross(blw_guard_t *self);
 /** tau = e, but 0 for the sensors of a set, l = S tau, and nu_i /= 0 for that set. */
 void blw_guard_start_without(blw_guard_t *self, blw_mask_t set);
-/** blw_guard_start_without() and all |h_i| there.  @return the largest of the |l_i|^2 there and, for the
- *  sensors of the set, at nu = 0. */
+/** blw_guard_start_without() and all |h_i| there.  @return the square of the largest one. */
 blw_real_t blw_guard_test_without(blw_guard_t *self, blw_mask_t set);
 /** h_i = l_i + (e_i - tau_i) of a sensor, all [r].  @return |h_i| */
 blw_real_t blw_guard_pull(size_t r, const blw_real_t *l, const blw_real_t *e, const blw_real_t *tau,
                           blw_real_t *h);
-/** The step (7) of blw_guard_solve.c of a sensor with k_i = k, all [r].  @return |h_i| */
+/** The step (7) of blw_guard_alone.c of a sensor with k_i = k, all [r]; *square = |step|^2.
+ *  @return |h_i| */
 blw_real_t blw_guard_step_alone(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
-                                const blw_real_t *tau, blw_real_t *step);
+                                const blw_real_t *tau, blw_real_t *step, blw_real_t *square);
 
-/** Solve (2) from e [N] and l = S e, or from tau and l as blw_guard_start_without() leaves them, and
- *  the |h_i| there; tau is left in self->eta.  Fills h, attacked, excluded.
- *  @return the bound on |x_hat - that of the minimiser|. */
-blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged);
-/** (9) of blw_guard_bound.c from e, tau and l with l' S^+ l = l' tau; BLW_REAL_MAX if the model has no
- *  kappa.  Overwrites suspicion. */
-blw_real_t blw_guard_bound(blw_guard_t *self);
+/** All |h_i|, and what would move.  The step of an excluded sensor is -l_i. */
+void blw_guard_survey(blw_guard_t *self, blw_guard_view_t *view);
+/** tau = e, unless blw_guard_start_without() has set it.  @return whether l holds the rounding of a
+ *  gross attack. */
+bool blw_guard_begin(blw_guard_t *self);
+/** Add `step` [r] to tau_i, with what that does to all l; attacked: nu_i /= 0 then. */
+void blw_guard_move_to(blw_guard_t *self, size_t i, const blw_real_t *step, bool attacked);
+/** (7) of blw_guard_alone.c for sensor i with k_i = k. */
+void blw_guard_move_alone(blw_guard_t *self, size_t i, blw_real_t k);
+/** Sensors i and j to the minimum of (2) over nu_i and nu_j, where j is the one excluded, and
+ *  l_j = 0. */
+void blw_guard_move_beside(blw_guard_t *self, size_t i, size_t j);
+/** (9) of blw_guard_bound.c from e, tau and l with l' S^+ l = l' tau, and the largest |l_i|;
+ *  BLW_REAL_MAX if the model has no kappa. */
+blw_real_t blw_guard_bound(const blw_guard_t *self, blw_real_t largest);
 /** Whether changes of |h_i| by `margin` would leave the sensors of a set above all others, and above
  *  the threshold. */
 bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin);
@@ -104,10 +139,6 @@ void blw_guard_move_together(blw_guard_t *self, blw_mask_t set, blw_mask_t small
                              blw_real_t close, unsigned limit);
 /** The sensors without nu_i that clip; suspicion is filled with all |l_i|^2. */
 blw_mask_t blw_guard_clipping(blw_guard_t *self);
-/** The step [r] of tau_i from l_i and tau_i to the minimum of (2) over nu_i and nu_j, where j is the one
- *  excluded sensor and l_j = 0.  @return whether nu_i /= 0 then. */
-bool blw_guard_step_beside(blw_guard_t *self, size_t i, size_t j, const blw_real_t *l,
-                           const blw_real_t *tau, blw_real_t *step);
 /** y = (S_ii - S_ij S_ji)^-1 x, 0 where nothing but i and j can check; turned [r] is overwritten. */
 void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
                       blw_real_t *turned, blw_real_t *y);

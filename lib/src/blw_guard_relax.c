@@ -10,35 +10,10 @@
  *     step_i = -V' diag(s)^-1 V (l_i - S_ij l_j),   step_j = -l_j - S_ji step_i.             (11) */
 #include "blw_cold.h"
 #include "blw_guard_internal.h"
-#include "blw_guard_strips.h"
 #include "blw_la.h"
 
 /* Sweeps over some sensors at most before all are looked at again. */
 #define MOST_SWEEPS 8U
-
-blw_real_t blw_guard_pull(size_t r, const blw_real_t *l, const blw_real_t *e, const blw_real_t *tau,
-                          blw_real_t *h)
-{
-    blw_real_t sum = BLW_R(0.0);
-
-    for (size_t a = 0U; a < r; a++) {
-        h[a] = l[a] + (e[a] - tau[a]);
-        sum += h[a] * h[a];
-    }
-    return blw_la_sqrt(sum);
-}
-
-blw_real_t blw_guard_step_alone(size_t r, blw_real_t k, const blw_real_t *l, const blw_real_t *e,
-                                const blw_real_t *tau, blw_real_t *step)
-{
-    const blw_real_t h = blw_guard_pull(r, l, e, tau, step);
-    const blw_real_t s = (h > k) ? (k / h) : BLW_R(1.0);
-
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = (s * step[a]) - l[a];
-    }
-    return h;
-}
 
 /* Add step [r] to the sensor's own tau and l, and what it does to the l of the others. */
 static BLW_COLD void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own,
@@ -62,14 +37,15 @@ static BLW_COLD void spread(const blw_guard_t *self, blw_guard_some_t *some, blw
 /* (7).  @return |step| */
 static BLW_COLD blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own)
 {
-    const size_t      r    = self->model->r;
-    blw_real_t *const step = self->turned;
+    const size_t      r      = self->model->r;
+    blw_real_t *const step   = self->turned;
+    blw_real_t        square = BLW_R(0.0);
     const blw_real_t  h =
-        blw_guard_step_alone(r, own->k, own->l, &self->e[own->sensor * r], own->tau, step);
+        blw_guard_step_alone(r, own->k, own->l, &self->e[own->sensor * r], own->tau, step, &square);
 
     spread(self, some, own, step);
     own->attacked = h > own->k;
-    return blw_la_norm(r, step);
+    return blw_la_sqrt(square);
 }
 
 /* (11) for the last two sensors. */
@@ -128,57 +104,6 @@ static BLW_COLD blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
     return blw_la_max(largest, eliminate(self, some));
 }
 
-/* Add `step` [r] to tau_i, with what that does to all l; attacked: nu_i /= 0 then. */
-static BLW_COLD void move(blw_guard_t *self, size_t i, const blw_real_t *step, bool attacked)
-{
-    const size_t r = self->model->r;
-
-    blw_guard_move(self, i, step);
-    self->attacked |= guard_bit(i);
-    if (!attacked) {
-        blw_la_copy(r, &self->e[i * r], &self->eta[i * r]);
-        self->attacked &= ~guard_bit(i);
-    }
-}
-
-/* (7) for a sensor alone. */
-static BLW_COLD void move_alone(blw_guard_t *self, const blw_guard_local_t *own)
-{
-    const size_t      r    = self->model->r;
-    const size_t      row  = own->sensor * r;
-    blw_real_t *const step = self->turned;
-    const blw_real_t  h =
-        blw_guard_step_alone(r, own->k, &self->l[row], &self->e[row], &self->eta[row], step);
-
-    move(self, own->sensor, step, h > own->k);
-}
-
-/* (10) for a sensor beside the one excluded. */
-static BLW_COLD void move_beside(blw_guard_t *self, const blw_guard_local_t *own,
-                                 const blw_guard_local_t *excluded)
-{
-    const size_t      r     = self->model->r;
-    const size_t      i     = own->sensor;
-    const size_t      j     = excluded->sensor;
-    blw_real_t *const l     = self->step; /* l_i with l_j = 0 */
-    blw_real_t *const step  = self->turned;
-    blw_real_t *const other = &self->turned[r];
-
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = -self->l[(j * r) + a];
-    }
-    blw_la_copy(r, &self->l[i * r], l);
-    blw_guard_couple(self->model, i, j, step, l);
-    const bool attacked = blw_guard_step_beside(self, i, j, l, &self->eta[i * r], step);
-    blw_la_copy(r, &self->l[j * r], other);
-    blw_guard_couple(self->model, j, i, step, other);
-    for (size_t a = 0U; a < r; a++) {
-        other[a] = -other[a];
-    }
-    move(self, i, step, attacked);
-    move(self, j, other, true);
-}
-
 /* Give the sums of the steps to all sensors. */
 static BLW_COLD void settle(blw_guard_t *self, const blw_guard_some_t *some)
 {
@@ -192,7 +117,7 @@ static BLW_COLD void settle(blw_guard_t *self, const blw_guard_some_t *some)
         for (size_t a = 0U; a < r; a++) {
             step[a] = own->tau[a] - self->eta[row + a];
         }
-        move(self, own->sensor, step, own->attacked);
+        blw_guard_move_to(self, own->sensor, step, own->attacked);
     }
 }
 
@@ -204,11 +129,12 @@ static BLW_COLD unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_re
     unsigned     done = 0U;
 
     if (some->count == 1U) {
-        move_alone(self, &some->at[0]);
+        blw_guard_move_alone(self, some->at[0].sensor, some->at[0].k);
         return 1U;
     }
     if ((self->model->pairs != 0U) && (some->count == 2U) && (some->penalised == 1U)) {
-        move_beside(self, &some->at[0], &some->at[1]);
+        blw_guard_move_alone(self, some->at[1].sensor, BLW_R(0.0));
+        blw_guard_move_beside(self, some->at[0].sensor, some->at[1].sensor);
         return 1U;
     }
     for (size_t j = 0U; j < some->count; j++) {

@@ -1,18 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/* Block coordinate descent on (2), and exclusion.
- *
- * Since S_ii = diag(I, 0), the minimum over nu_i alone is (3), and with s = min(1, k_i / |h_i|) it
- * moves tau_i, and l_i, by
- *     step = s h_i - l_i.                                                                    (7)
- * tau is kept rather than nu: it stays at noise size however large the attack, and a sensor that
- * leaves the support gets tau_i = e_i exactly.  Where tau_i starts makes no difference to the minimum:
- * after a gross attack it starts from 0, and l = S tau holds no rounding of what was sent. */
+/* Block coordinate descent on (2), several sensors at a time, and exclusion: for any number of
+ * liars. */
 #include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
-
-/* Largest |step| that ends the descent, relative to k: eps^(2/3), about. */
-#define TOLERANCE ((BLW_REAL_EPS > BLW_R(1e-10)) ? BLW_R(3e-5) : BLW_R(3e-11))
 
 /* While it is only to be decided which units to exclude, the steps of the sensors that move together
  * end at this part of the largest one. */
@@ -25,82 +16,15 @@
 /* Updates that looking at all sensors counts as, wherever that leads. */
 #define LOOK 2U
 
-/* The units to exclude are beyond doubt if no |h_i| is nearer to where it would matter than this
- * many times the largest |step|. */
-#define CLEAR BLW_R(8.0)
-
-/* Units are excluded at once if their |h_i| are larger than all others and than the threshold by
- * this many times k. */
-#define AT_ONCE BLW_R(4.0)
-
 typedef struct descent {
-    blw_real_t pending; /* sum over the sensors of effect_i |step_i| */
-    blw_real_t largest; /* largest |step_i| */
-    size_t     sensor;  /* whose it is */
-    unsigned   limit;   /* on self->updates */
-    unsigned   repeats; /* updates of sensors that had had one */
-    bool       gross;   /* l may hold the rounding of a gross attack */
-    bool       decides; /* ends as soon as it is clear which units to exclude */
-    bool       fresh;   /* the survey is up to date */
-    blw_mask_t chosen;  /* what `decides` has ended with, or 0 */
+    blw_guard_view_t view;
+    unsigned         limit;   /* on self->updates */
+    unsigned         repeats; /* updates of sensors that had had one */
+    bool             gross;   /* l may hold the rounding of a gross attack */
+    bool             decides; /* ends as soon as it is clear which units to exclude */
+    bool             fresh;   /* the view is up to date */
+    blw_mask_t       chosen;  /* what `decides` has ended with, or 0 */
 } descent_t;
-
-static void note_step(descent_t *descent, size_t i, blw_real_t length)
-{
-    if (length > descent->largest) {
-        descent->largest = length;
-        descent->sensor  = i;
-    }
-}
-
-/* The largest step where no sensor has nu_i, from all |h_i|. */
-static BLW_COLD void note_clipping(const blw_guard_t *self, descent_t *descent)
-{
-    const blw_real_t k = self->model->k;
-
-    descent->pending = BLW_R(0.0);
-    descent->largest = BLW_R(0.0);
-    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        if (self->h[i] > k) {
-            descent->pending += self->model->effect[i] * (self->h[i] - k);
-            note_step(descent, i, self->h[i] - k);
-        }
-    }
-}
-
-/* All |h_i|, and the largest step.  The step of an excluded sensor is -l_i. */
-static BLW_COLD BLW_APART void survey(blw_guard_t *self, descent_t *descent)
-{
-    const size_t     r        = self->model->r;
-    const blw_real_t k        = self->model->k;
-    blw_real_t      *h        = self->h;
-    blw_mask_t       excluded = self->excluded;
-    blw_mask_t       support  = self->attacked | excluded;
-
-    descent->pending = BLW_R(0.0);
-    descent->largest = BLW_R(0.0);
-    blw_guard_squares(self->model, self->l, h);
-    for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        blw_real_t step = blw_la_sqrt(h[i]);
-
-        h[i] = step;
-        if ((support & 1U) != 0U) {
-            const size_t row = i * r;
-
-            h[i] = blw_guard_step_alone(r, k, &self->l[row], &self->e[row], &self->eta[row],
-                                        self->step);
-            step = ((excluded & 1U) != 0U) ? step : blw_la_norm(r, self->step);
-        } else {
-            step -= k;
-        }
-        if (step > BLW_R(0.0)) {
-            descent->pending += self->model->effect[i] * step;
-            note_step(descent, i, step);
-        }
-        support >>= 1;
-        excluded >>= 1;
-    }
-}
 
 /* Block updates that a joint step on some sensors counts as: its spreads, and its factorisation. */
 static BLW_COLD unsigned cost_of(const blw_guard_t *self, blw_mask_t set)
@@ -131,7 +55,7 @@ static BLW_COLD BLW_APART bool update_jointly(blw_guard_t *self, blw_mask_t set,
  * fewer if these are too many. */
 static BLW_COLD void list_next(blw_guard_t *self, const descent_t *descent, blw_guard_some_t *some)
 {
-    const blw_mask_t next    = guard_bit(descent->sensor);
+    const blw_mask_t next    = guard_bit(descent->view.sensor);
     const blw_mask_t support = self->attacked | self->excluded;
 
     if (!blw_guard_list(self, support | next | ((support != 0U) ? blw_guard_clipping(self) : 0U),
@@ -153,7 +77,7 @@ static BLW_COLD BLW_APART bool move_next(blw_guard_t *self, const descent_t *des
     if (blw_guard_move_some(self, &some, close, limit)) {
         return true;
     }
-    (void)blw_guard_list(self, self->excluded | guard_bit(descent->sensor), &some);
+    (void)blw_guard_list(self, self->excluded | guard_bit(descent->view.sensor), &some);
     return blw_guard_move_some(self, &some, close, limit);
 }
 
@@ -161,10 +85,10 @@ static BLW_COLD BLW_APART bool move_next(blw_guard_t *self, const descent_t *des
 static BLW_COLD BLW_APART bool update(blw_guard_t *self, descent_t *descent)
 {
     const blw_real_t k       = self->model->k;
-    const blw_mask_t next    = guard_bit(descent->sensor);
+    const blw_mask_t next    = guard_bit(descent->view.sensor);
     const blw_mask_t support = self->attacked | self->excluded;
     const bool       several = !blw_guard_exact(self, blw_mask_count(self->excluded));
-    blw_real_t       close   = TOLERANCE * k;
+    blw_real_t       close   = GUARD_TOLERANCE * k;
 
     if ((self->updates + LOOK + ((self->excluded != 0U) ? 4U : 1U)) > descent->limit) {
         return false;
@@ -178,7 +102,7 @@ static BLW_COLD BLW_APART bool update(blw_guard_t *self, descent_t *descent)
         return true;
     }
     if (descent->decides) {
-        close = blw_la_max(close, COARSE * descent->largest);
+        close = blw_la_max(close, COARSE * descent->view.largest);
     }
     const bool moved = move_next(self, descent, close);
     self->updates    = (uint16_t)(self->updates + LOOK);
@@ -197,17 +121,17 @@ static BLW_COLD bool descend(blw_guard_t *self, unsigned limit, descent_t *desce
     descent->repeats = 0U;
     for (;;) {
         if (!descent->fresh) {
-            survey(self, descent);
+            blw_guard_survey(self, &descent->view);
         }
         descent->fresh   = false;
-        const bool still = descent->largest <= (TOLERANCE * k);
+        const bool still = descent->view.largest <= (GUARD_TOLERANCE * k);
         if (still && descent->gross && !renewed) {
             blw_guard_multipliers(self->model, self->eta, self->l);
             renewed = true;
             continue;
         }
         if (!still && descent->decides && (self->updates > 0U)) {
-            descent->chosen = blw_guard_choose(self, CLEAR * descent->largest, &clear);
+            descent->chosen = blw_guard_choose(self, GUARD_CLEAR * descent->view.largest, &clear);
         }
         if (clear) {
             return false;
@@ -216,7 +140,7 @@ static BLW_COLD bool descend(blw_guard_t *self, unsigned limit, descent_t *desce
         if (still || !update(self, descent)) {
             return still;
         }
-        descent->gross = descent->gross || (descent->largest > (GUARD_GROSS * k));
+        descent->gross = descent->gross || (descent->view.largest > (GUARD_GROSS * k));
     }
 }
 
@@ -229,7 +153,7 @@ static BLW_COLD BLW_APART void eliminate(blw_guard_t *self, unsigned limit)
         return;
     }
     blw_guard_move_together(self, self->attacked | self->excluded, self->excluded,
-                            TOLERANCE * self->model->k, limit);
+                            GUARD_TOLERANCE * self->model->k, limit);
 }
 
 /* Solve for what clips beside the excluded sensors, if these stand out; for the one that clips most
@@ -250,11 +174,12 @@ static BLW_COLD BLW_APART void move_clipping(blw_guard_t *self, unsigned limit)
         }
         i++;
     }
-    if (!blw_guard_stands_out(self, self->excluded, AT_ONCE * self->model->k)) {
+    if (!blw_guard_stands_out(self, self->excluded, GUARD_AT_ONCE * self->model->k)) {
         return;
     }
     blw_guard_move_together(self, self->attacked | self->excluded | more,
-                            self->excluded | guard_bit(most), TOLERANCE * self->model->k, limit);
+                            self->excluded | guard_bit(most), GUARD_TOLERANCE * self->model->k,
+                            limit);
 }
 
 /* Updates that eliminate() takes at least. */
@@ -297,11 +222,11 @@ static BLW_COLD bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned
 static BLW_COLD BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit,
                                                descent_t *descent)
 {
-    const blw_real_t margin = AT_ONCE * self->model->k;
+    const blw_real_t margin = GUARD_AT_ONCE * self->model->k;
     bool             clear  = false;
     blw_mask_t       set    = blw_guard_choose(self, margin, &clear);
     if (!clear && !descent->fresh) {
-        survey(self, descent);
+        blw_guard_survey(self, &descent->view);
         descent->fresh = true;
         set            = blw_guard_choose(self, margin, &clear);
     }
@@ -315,7 +240,7 @@ static BLW_COLD BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit
         move_clipping(self, limit - 1U);
     }
     self->updates++;
-    survey(self, descent);
+    blw_guard_survey(self, &descent->view);
     descent->fresh = blw_guard_stands_out(self, set, margin);
     if (!descent->fresh) {
         self->excluded = 0U;
@@ -348,28 +273,14 @@ static BLW_COLD BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned l
     return set;
 }
 
-/* Where the first descent starts. */
-static BLW_COLD void start(blw_guard_t *self, descent_t *descent)
-{
-    const blw_guard_model_t *const model = self->model;
-
-    if (self->attacked != 0U) {
-        return;
-    }
-    blw_la_copy((size_t)model->head.plant->m * model->r, self->e, self->eta);
-    note_clipping(self, descent);
-    descent->gross = descent->largest > (GUARD_GROSS * model->k);
-    descent->fresh = true;
-}
-
-BLW_COLD blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
+static BLW_COLD blw_real_t solve(blw_guard_t *self, bool *converged)
 {
     const blw_guard_model_t *const model   = self->model;
     const unsigned                 most    = model->max_updates;
     const bool                     search  = model->search != 0U;
     descent_t                      descent = {.decides = self->warm_up == 0U};
 
-    start(self, &descent);
+    descent.gross = blw_guard_begin(self);
     const blw_mask_t set =
         find_excluded(self, search ? (most / 4U) : (most / 2U), &descent, converged);
     if (set != 0U) {
@@ -385,5 +296,11 @@ BLW_COLD blw_real_t blw_guard_solve(blw_guard_t *self, bool *converged)
         blw_guard_start_without(self, found);
         *converged = descend_without(self, found, most, &descent);
     }
-    return *converged ? descent.pending : blw_guard_bound(self);
+    if (*converged) {
+        return descent.view.pending;
+    }
+    blw_guard_survey(self, &descent.view);
+    return blw_guard_bound(self, descent.view.l);
 }
+
+const blw_guard_solver_t blw_guard_many_ops = {.solve = solve};

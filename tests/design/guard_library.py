@@ -9,7 +9,8 @@ from c_library import CLibrary, common_layouts, compile_method
 
 MODULES = ("blw_guard", "blw_guard_check", "blw_guard_search", "blw_guard_solve",
            "blw_guard_beside", "blw_guard_gross", "blw_guard_relax", "blw_guard_bound",
-           "blw_guard_filters", "blw_guard_S", "blw_guard_strips")
+           "blw_guard_filters", "blw_guard_S", "blw_guard_strips",
+           "blw_guard_alone", "blw_guard_one")
 METHOD_GUARD = 7
 
 
@@ -32,8 +33,8 @@ def layouts(real: type) -> dict[str, type]:
                     + [(k, pointer) for k in ("Lam", "b", "S", "V", "s", "Fu", "Gu", "Xu",
                                               "Xs", "Sig", "effect", "drift")]
                     + [(k, real) for k in ("k", "exclude", "gain", "kappa", "omega", "sigma")]
-                    + [(k, ct.c_void_p) for k in ("advance", "multiply", "squares", "average",
-                                                 "fuse", "move")])
+                    + [(k, ct.c_void_p) for k in ("solver", "advance", "multiply", "squares",
+                                                 "average", "fuse", "move")])
 
     class Guard(ct.Structure):
         _fields_ = ([("ops", ct.c_void_p), ("model", ct.c_void_p)]

@@ -18,8 +18,9 @@ STEPS = 1_000
 PERIOD = 20
 
 #: Kind of attack: whether the liar stays the same, and standard deviations of what it adds.
-FAMILIES = {"one liar": (True, 1e6), "changing": (False, 1e6), "changing, small": (False, 30.0)}
-LIMITS = {"liu5": (1_800, 6_100), "random6": (12_000, 30_000)}
+FAMILIES = {"one liar": (True, 1e6), "one liar, small": (True, 30.0), "changing": (False, 1e6),
+            "changing, small": (False, 30.0)}
+LIMITS = {"liu5": (1_800, 5_000), "random6": (12_000, 30_000)}
 
 
 def samples(model, stays, largest):

@@ -79,6 +79,7 @@ static inline void guard_make(guard_made_t *made)
         .n_units     = 3U,
         .most        = (uint8_t)GUARD_MOST,
         .pairs       = 1U,
+        .solver      = &blw_guard_many_ops,
         .max_updates = 20U,
         .unit        = guard_unit,
         .rank        = guard_rank,

@@ -223,7 +223,8 @@ static inline void random_bind(guard_random_t *made, size_t r, size_t p)
         .exclude = BLW_R(3.0),
         .gain    = BLW_R(0.125),
         .kappa   = BLW_R(1.0),
-        .omega   = BLW_R(1.0)};
+        .omega   = BLW_R(1.0),
+        .solver  = &blw_guard_many_ops};
     made->model.max_updates = 200U;
 }
 

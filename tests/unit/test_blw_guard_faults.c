@@ -69,6 +69,19 @@ static void test_init_given_sizes_out_of_limits_refuses(void)
     assert_refused();
     made.model.max_updates = 0U;
     assert_refused();
+    made.model.solver = NULL;
+    assert_refused();
+}
+
+static void test_init_given_the_solver_for_one_liar_without_what_it_needs_refuses(void)
+{
+    made.model.solver = &blw_guard_one_ops;
+    made.model.pairs  = 0U;
+    assert_refused();
+    made.model.solver   = &blw_guard_one_ops;
+    made.kalman.plant.p = 2U;
+    made.model.most     = 2U;
+    assert_refused();
 }
 
 static void test_init_given_wrong_units_or_ranks_refuses(void)
@@ -240,6 +253,7 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_init_given_null_or_little_memory_refuses);
     RUN_TEST(test_init_given_sizes_out_of_limits_refuses);
+    RUN_TEST(test_init_given_the_solver_for_one_liar_without_what_it_needs_refuses);
     RUN_TEST(test_init_given_wrong_units_or_ranks_refuses);
     RUN_TEST(test_init_given_wrong_numbers_refuses);
     RUN_TEST(test_init_given_missing_tables_or_a_wrong_sum_refuses);

@@ -78,7 +78,7 @@ static double violation_of_step(bool *converged)
     guard.attacked = 0U;
     guard.excluded = 0U;
     guard.updates  = 0U;
-    (void)blw_guard_solve(&guard, converged);
+    (void)made.model.solver->solve(&guard, converged);
     const double found = violation(guard.eta);
     memcpy(guard.eta, guard.e, made.plant.m * made.model.r * sizeof guard.e[0]);
     return found;
@@ -107,7 +107,11 @@ static void test_step_given_any_size_solves_to_the_optimum(void)
         random_make(&made, 5U, r, (3U * r) + 1U, 1U);
         start();
         assert_optimal(60U, 1U, 2.0);
-        made.model.pairs = 0U; /* the same by block updates and Newton steps alone */
+        made.model.solver = &blw_guard_one_ops; /* one sensor after the other */
+        start();
+        assert_optimal(60U, 1U, 2.0);
+        made.model.solver = &blw_guard_many_ops;
+        made.model.pairs  = 0U; /* by block updates and Newton steps alone */
         start();
         assert_optimal(60U, 1U, 2.0);
     }
@@ -127,18 +131,25 @@ static void test_step_given_two_attackers_excludes_them_jointly(void)
 
 static void test_step_during_warm_up_solves_without_exclusion(void)
 {
-    random_make(&made, 5U, 3U, 9U, 1U);
-    made.model.warm_up = 1000U;
-    start();
-    guard.warm_up = 1000U;
-    assert_optimal(200U, 3U, 1.0);
-    TEST_ASSERT_EQUAL_HEX64(0U, out.excluded);
+    const blw_guard_solver_t *const solvers[2] = {&blw_guard_many_ops, &blw_guard_one_ops};
+
+    for (size_t pass = 0U; pass < 2U; pass++) {
+        random_make(&made, 5U, 3U, 9U, 1U);
+        made.model.solver  = solvers[pass];
+        made.model.warm_up = 1000U;
+        start();
+        assert_optimal(200U, 3U, 1.0);
+        TEST_ASSERT_EQUAL_HEX64(0U, out.excluded);
+    }
 }
 
 static void test_step_given_any_bound_keeps_to_it(void)
 {
-    for (size_t p = 1U; p <= 2U; p++) {
+    for (size_t pass = 0U; pass < 3U; pass++) {
+        const size_t p = (pass == 2U) ? 2U : 1U;
+
         random_make(&made, 6U, 3U, 12U, p);
+        made.model.solver = (pass == 0U) ? &blw_guard_one_ops : &blw_guard_many_ops;
         for (uint16_t most = 1U; most <= 24U; most++) {
             made.model.max_updates = most;
             made.model.search      = ((p == 2U) && ((most % 3U) == 0U)) ? 1U : 0U;

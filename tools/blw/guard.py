@@ -20,7 +20,7 @@ from blw.guard_fusion import Fusion
 from blw.kalman import Kalman
 from blw.l1 import probability
 from blw.model import Model
-from blw.tables import Struct, Table, index, real, table
+from blw.tables import Link, Struct, Table, index, real, table
 
 Array = NDArray
 
@@ -46,12 +46,17 @@ DRIFT_SIGMAS = 5.0
 #: Block updates per step and attacked unit, and one more per so many multiply-adds of one where the
 #: work beside them weighs less; where several sensors are excluded jointly without tables; and
 #: where more than RARE_CLIPPING of the benign steps need some.
-UPDATES = 6
-UPDATE_TERMS = 80
+UPDATES = 7
+UPDATE_TERMS = 60
 MOST_UPDATES = 16
 UPDATES_IF_JOINT = 30
 UPDATES_IF_OFTEN = 200
 RARE_CLIPPING = 0.95
+
+#: How (2) is solved: for one liar with tables for every sensor beside it, unless the work may be
+#: more than MOST_UPDATES; for everything.
+ONE = Link("blw_guard_one_ops", "one")
+MANY = Link("blw_guard_many_ops", "many")
 
 #: Sensors beside the p excluded units that a Newton step has room for.
 NEWTON_RESERVE = 3
@@ -171,6 +176,7 @@ def struct(
         "kappa": real(guard_fusion.kappa(fusion, bank.split.Xu, sets)),
         "omega": real(np.sqrt(model.m) * norm(fusion.W @ fusion.Z)),
         "sigma": real(norm(bank.split.Xs @ fusion.Sig @ fusion.Z)),
+        "solver": ONE if pairs and model.p == 1 and limits.max_updates <= MOST_UPDATES else MANY,
         "advance": guard_straight.advance(model, kalman, fusion),
         "multiply": guard_straight.multiply(fusion),
         "squares": guard_straight.squares(model.m, bank.r),

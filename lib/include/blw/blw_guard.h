@@ -34,6 +34,14 @@
 extern "C" {
 #endif
 
+/** How (2) is solved: each model names one of these, and only that one is linked. */
+typedef struct blw_guard_solver blw_guard_solver_t;
+
+/** For p = 1, with pairs: one sensor after the other. */
+extern const blw_guard_solver_t blw_guard_one_ops;
+/** For everything: some sensors together, Newton steps on them, and the search. */
+extern const blw_guard_solver_t blw_guard_many_ops;
+
 /* Straight-line code that the design tool writes for small models: the same bits as the loops. */
 
 /** x_bar and e of (1) from u [l], y [m], all valid, x_ref and eta.  @return false with nothing changed
@@ -69,7 +77,7 @@ typedef struct blw_guard_model {
                                         whenever a unit is excluded */
     uint8_t           pairs;       /**< 1: V and s are there; needs p = 1 or 2 and n_units = m */
     uint16_t          max_updates; /**< bound on block updates in one step, >= 1; joint steps count
-                                        as several (blw_guard_solve.c) */
+                                        as several */
     uint16_t          warm_up;     /**< steps after reset without exclusion */
     const uint16_t   *unit;        /**< [m] the sensor's unit */
     const uint16_t   *rank;        /**< [m] ones in S_ii, the first of its diagonal */
@@ -93,6 +101,7 @@ typedef struct blw_guard_model {
                                         out of the sum; 0 if there is no such number */
     blw_real_t        omega;   /**< sum_i |(W z)_i| <= omega |z' S^+ z|^(1/2) for z in range S */
     blw_real_t        sigma;   /**< |Xs Sig l| <= sigma |l' S^+ l|^(1/2) */
+    const blw_guard_solver_t   *solver;  /**< one of the above */
     blw_guard_advance_kernel_t  advance; /**< as the next five may be NULL */
     blw_guard_multiply_kernel_t multiply;
     blw_guard_squares_kernel_t  squares;
@@ -137,7 +146,7 @@ blw_status_t blw_guard_init(blw_guard_t *self, const blw_guard_model_t *model, b
 /** As blw_estimator_ops.reset. */
 blw_status_t blw_guard_reset(blw_guard_t *self, const blw_real_t *x0);
 /** As blw_estimator_ops.step.  out->statistic = max_i |l_i| at nu = 0 (after a gross
- *  attack, of the sensors that it has reached), out->threshold = k; a
+ *  attack max_i |h_i|, where tau_i = 0 for the sensors that it has reached), out->threshold = k; a
  *  sensor's suspicion is from |h_i| / k, or from the slow average of l_i if that is larger.
  *  Without attack N^2 + 2 N n + N (r + n_u) multiply-adds at most; every block update adds N r, and
  *  N^2 are added once or twice where an attack is gross. */

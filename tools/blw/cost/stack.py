@@ -4,8 +4,9 @@
 Routines of the compiler's library have no such graph; theirs is read off the disassembly, where the
 sum over all of a routine's pushes is an upper bound.  A call through a pointer may go to any
 straight-line kernel of the model that the linker kept, and to any function of the const objects
-<name>_ops in which modules offer themselves to each other; not back to where it comes from, since
-the library has no recursion, nor to its own file, where calls have names.  Recursion and a frame of
+<name>_ops in which modules offer themselves to each other; not back to where it comes from, nor to
+what calls that by name, since the library has no recursion, nor to its own file, where calls have
+names.  Recursion and a frame of
 unknown size are errors, not guesses.
 """
 
@@ -58,9 +59,20 @@ class CallGraph:
             raise StepFailed(f"the stack of {root} is not known")
         callees = self.calls.get(root, set())
         if root == _POINTER:
-            callees = {name for name in callees.difference(path) if not _share_file(name, path[-1])}
+            callees = {name for name in callees.difference(path)
+                       if not _share_file(name, path[-1]) and self.reached(name).isdisjoint(path)}
         below = (self.deepest(callee, (*path, root)) for callee in callees)
         return self.frames[root] + max(below, default=0)
+
+    def reached(self, root: str) -> set[str]:
+        """What root calls by name, directly or not."""
+        found: set[str] = set()
+        waiting = [root]
+        while waiting:
+            new = self.calls.get(waiting.pop(), set()) - found - {_POINTER}
+            found |= new
+            waiting += new
+        return found
 
 
 def _share_file(one: str, other: str) -> bool:
