@@ -24,7 +24,6 @@ CEILING = 1.5             # of an average over its threshold: it recovers in a t
 SETTLED = 0.01            # part of P_opt that the initial error may still hold
 UNKNOWN_START = 1e4       # times P: the initial error covariance that is provided for without P0
 MAX_WARM_UP = 60000
-MAX_GAP = 3.0             # samples of the slowest sensor that have to fail to come
 MOST_GAP = 254            # steps that the device can tell from silence
 WORTHWHILE = 0.8          # of epsilon: a longer horizon that leaves more is not proposed
 
@@ -46,10 +45,8 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
 
 
 def _max_gap(model: Model) -> int:
-    """Steps in which a few samples of the slowest sensor should have come; 0 if all send always."""
-    if np.all(model.rate == 1.0):
-        return 0
-    return min(MOST_GAP, int(np.ceil(MAX_GAP / model.rate.min())))
+    """Steps after which a sensor is silent; 0 if all send in every step."""
+    return 0 if np.all(model.rate == 1.0) else min(MOST_GAP, model.silence)
 
 
 def _warm_up(model: Model, kalman: Kalman, bank: Bank) -> int:

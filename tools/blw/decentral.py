@@ -39,7 +39,6 @@ AVERAGES = True
 FALSE_ALARM = 1e-3
 FALSE_ALARM_PRINTED = 0.05
 READMIT = 20
-MAX_GAP = 3
 
 #: Most sets of sensors that a search may compare.
 _MAX_SETS = 20_000
@@ -63,7 +62,7 @@ class Options:
     gains: Literal["steady", "recursive"] = "steady"
     variant: Literal["corrected", "printed"] = "corrected"
     #: steps that a sensor may be missing before it is left out like an attacked one
-    #: default: the steps in which MAX_GAP samples of the sensor that sends least should come
+    #: default: until three samples of the sensor that sends least should have come
     max_gap: int | None = field(default=None, metadata={"ge": 1, "le": 65535})
     #: limits of the device; one that is not given does not limit
     max_flash_bytes: int | None = field(default=None, metadata={"gt": 0})
@@ -94,7 +93,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "rows": most_rows,
         "warm_up": warm_up(filters, fusion.N, P0) if steady else 0,
         "readmit": _readmit(options),
-        "max_gap": _max_gap(model, options),
+        "max_gap": model.silence if options.max_gap is None else options.max_gap,
         "reseed": int(options.reseed),
         "first": index(filters.first, "[m + 1] first row of every sensor, then mu"),
         "Phi": table(filters.Phi, "[mu x n] stacked bases Z_i'"),
@@ -172,13 +171,6 @@ def _disturbed(model: Model, filters: LocalFilters, fusion: Fusion) -> float:
         rows = filters.rows(i)
         settled[rows, i] = np.linalg.solve(np.eye(len(F)) - F, filters.K[rows])
     return margin.largest(fusion.N @ settled, margin.sigma(model))
-
-
-def _max_gap(model: Model, options: Options) -> int:
-    """As given, or MAX_GAP of the steps between two samples of the sensor that sends least."""
-    if options.max_gap is not None:
-        return options.max_gap
-    return int(np.ceil(MAX_GAP / model.rate.min()))
 
 
 def _readmit(options: Options) -> int:

@@ -28,6 +28,8 @@ MAX_SIZE = 255
 SYMMETRY = 1e-9
 #: A sensor that sends more rarely has to be modelled on slower steps.
 MIN_RATE = 0.01
+#: Samples that have to fail to come before a sensor counts as silent.
+EXPECTED = 3
 
 Array = NDArray[np.float64]
 
@@ -77,6 +79,11 @@ class Model:
     def weight(self) -> Array:
         """[m] steps that one sample stands for, 1 / rate."""
         return 1.0 / self.rate
+
+    @property
+    def silence(self) -> int:
+        """Steps in which EXPECTED samples of the sensor that sends least should have come."""
+        return int(np.ceil(EXPECTED / self.rate.min()))
 
     def averaged(self) -> "Model":
         """The same plant with sensors that send in every step and tell as much in the long run.
