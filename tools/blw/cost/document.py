@@ -15,8 +15,8 @@ COLUMNS = {"instructions_typical": "typical", "instructions_mean_attacked": "att
 
 HEAD = f"""# What a step costs
 
-Made by `tools/bulwark bench --write docs/cost.md`; the tests hold a part of it against a new
-measurement.
+Made by `tools/bulwark bench --write docs/cost.md`. The tests measure liu5 again and compare its
+lines; with `BULWARK_EXTENDED=1` they write the whole document again.
 
 Executed instructions of one step, from the first of `blw_<method>_step` to its return: the median
 of {BENIGN_STEPS} steps without attack, the mean of 200 attacked steps, the most of all. The logs
@@ -67,10 +67,10 @@ def text(rows: Sequence[dict[str, Any]], contracted: Sequence[dict[str, Any]],
     lines = [HEAD]
     for target in dict.fromkeys(row["target"] for row in rows):
         own = [row for row in rows if row["target"] == target]
-        lines += [f"## {TARGETS[target].title}", *_table(own)]
+        lines += [f"## {TARGETS[target].title}", *table(own)]
     if small:
         title = TARGETS[small[0]["target"]].title
-        lines += [SMALL.format(title=title, model=small[0]["model"]), *_table(small)]
+        lines += [SMALL.format(title=title, model=small[0]["model"]), *table(small)]
     if contracted:
         lines += [CONTRACTION, *map(_contracted_line, contracted), ""]
     lines += ["## Refused", *(f"- {one['model']}, `{one['method']}`: {one['reason']}"
@@ -94,7 +94,8 @@ def _contracted_line(row: dict[str, Any]) -> str:
     return f"| `{row['what']}` | {figures} |"
 
 
-def _table(rows: Sequence[dict[str, Any]]) -> list[str]:
+def table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Head, one line a row, and an empty one."""
     columns = [key for key in COLUMNS if any(row[key] is not None for row in rows)]
     return [*_table_head(columns), *(line(row, columns) for row in rows), ""]
 
