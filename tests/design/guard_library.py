@@ -5,12 +5,9 @@ import ctypes as ct
 from pathlib import Path
 
 import numpy as np
-from c_library import CLibrary, common_layouts, compile_method
+from c_library import LIB, CLibrary, common_layouts, compile_method
 
-MODULES = ("blw_guard", "blw_guard_check", "blw_guard_search", "blw_guard_solve",
-           "blw_guard_beside", "blw_guard_gross", "blw_guard_relax", "blw_guard_bound",
-           "blw_guard_filters", "blw_guard_S", "blw_guard_strips",
-           "blw_guard_alone", "blw_guard_one")
+MODULES = [path.stem for path in sorted((LIB / "src").glob("blw_guard*.c"))]
 METHOD_GUARD = 7
 
 

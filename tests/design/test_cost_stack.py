@@ -32,6 +32,14 @@ def test_deepest_given_a_pointer_does_not_return_to_its_own_file():
     assert made.deepest("e.c:multiply") == 10 + 20
 
 
+def test_deepest_given_a_pointer_does_not_lead_back_to_its_caller():
+    made = graph({"root": 8, "squares": 10, "solver": 100, "helper": 1, "kernel": 20},
+                 {"root": [POINTER, "squares"], "squares": [POINTER], "solver": ["helper"],
+                  "helper": ["squares"], POINTER: ["solver", "kernel"]})
+    assert made.deepest("squares") == 10 + 20
+    assert made.deepest("root") == 8 + 100 + 1 + 10 + 20
+
+
 def test_deepest_given_recursion_fails_by_name():
     made = graph({"root": 8, "a": 16}, {"root": ["a"], "a": ["root"]})
     with pytest.raises(StepFailed, match="recursion: root -> a -> root"):

@@ -96,10 +96,9 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
                "l1_factor", "l1_kkt", "l1_newton", "l1_newton_step", "l1_refine", "l1_support",
-               "l1_tableau", "guard", "guard_S",
-               "guard_beside", "guard_bound", "guard_check", "guard_filters", "guard_gross",
-               "guard_relax", "guard_search", "guard_solve"]
-    sources = [ROOT / "lib" / "src" / f"blw_{module}.c" for module in modules]
+               "l1_tableau"]
+    library = ROOT / "lib" / "src"
+    sources = [*(library / f"blw_{module}.c" for module in modules), *library.glob("blw_guard*.c")]
     subprocess.run(["gcc", "-std=c99", "-O1", "-ffp-contract=off", *WIDTHS[width],
                     f"-I{ROOT / 'lib' / 'include'}", *sources, folder / f"{name}_model.c",
                     folder / "main.c", "-lm", "-o", folder / "main"], check=True)
