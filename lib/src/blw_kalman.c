@@ -134,45 +134,29 @@ static void correct(blw_kalman_t *self, const blw_real_t *y, blw_mask_t used)
     }
 }
 
-/* Step by the loops, checking everything.  *used: the samples taken in. */
-static blw_status_t checked_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
-                                 blw_mask_t valid, blw_mask_t *used)
+/* Step by the loops, with the samples in used or, if they would overflow the state, without any.
+ * Returns those that were taken in. */
+static blw_mask_t loop_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
+                            blw_mask_t used)
 {
-    const blw_plant_t *const plant  = self->model->head.plant;
-    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+    const blw_plant_t *const plant = self->model->head.plant;
 
-    if (status != BLW_OK) {
-        return status;
-    }
-    *used = blw_plant_screen(plant, y, valid);
-    if ((*used == self->all) && closed_step(self, u, y)) {
-        return BLW_OK;
+    if ((used == self->all) && closed_step(self, u, y)) {
+        return used;
     }
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
-    correct(self, y, *used);
-    if (!blw_la_bounded(plant->n, self->x_hat)) {
-        *used = 0U; /* the samples would overflow the state: predict instead */
-        correct(self, y, *used);
+    correct(self, y, used);
+    if (blw_la_bounded(plant->n, self->x_hat)) {
+        return used;
     }
-    return BLW_OK;
+    correct(self, y, 0U);
+    return 0U;
 }
 
-blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
-                             blw_mask_t valid, blw_estimator_out_t *out)
+/* Member by member: a compound literal would be cleared by memset first. */
+static inline void report(const blw_kalman_t *self, blw_mask_t used, uint8_t flags,
+                          blw_estimator_out_t *out)
 {
-    if ((self == NULL) || (out == NULL)) {
-        return BLW_ERR_ARG;
-    }
-    blw_mask_t used  = valid;
-    uint8_t    flags = 0U;
-    if (!quick_step(self, u, y, valid)) {
-        const blw_status_t status = checked_step(self, u, y, valid, &used);
-        if (status != BLW_OK) {
-            return status;
-        }
-        flags = blw_step_flags(self->model->head.plant, used, 0U);
-    }
-    /* member by member: a compound literal would be cleared by memset first */
     out->x_hat      = self->x_hat;
     out->suspicion  = self->suspicion;
     out->statistic  = BLW_R(0.0);
@@ -183,6 +167,34 @@ blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_
     out->iterations = 0U;
     out->outcome    = (uint8_t)BLW_OUTCOME_KALMAN;
     out->flags      = flags;
+}
+
+/* Everything but the usual step; apart, so that this one saves few registers. */
+static BLW_APART blw_status_t checked_step(blw_kalman_t *self, const blw_real_t *u,
+                                           const blw_real_t *y, blw_mask_t valid,
+                                           blw_estimator_out_t *out)
+{
+    const blw_plant_t *const plant  = self->model->head.plant;
+    const blw_status_t       status = blw_step_check(plant, u, y, valid);
+
+    if (status != BLW_OK) {
+        return status;
+    }
+    const blw_mask_t used = loop_step(self, u, y, blw_plant_screen(plant, y, valid));
+    report(self, used, blw_step_flags(plant, used, 0U), out);
+    return BLW_OK;
+}
+
+blw_status_t blw_kalman_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t *y,
+                             blw_mask_t valid, blw_estimator_out_t *out)
+{
+    if ((self == NULL) || (out == NULL)) {
+        return BLW_ERR_ARG;
+    }
+    if (!quick_step(self, u, y, valid)) {
+        return checked_step(self, u, y, valid, out);
+    }
+    report(self, valid, 0U, out);
     return BLW_OK;
 }
 

@@ -16,7 +16,7 @@ from blw.design import Designed
 from blw.tables import Code
 
 #: kalman: around the straight-line code, and a multiply-add of the loops.
-KALMAN_AROUND = 54
+KALMAN_AROUND = 48
 KALMAN_LOOP = 10.6
 
 #: decentral: around all, a sensor or row of a product, a multiply-add.
