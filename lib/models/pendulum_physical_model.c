@@ -859,7 +859,7 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     const blw_real_t x13 = col[13];
     const blw_real_t x14 = col[14];
     const blw_real_t x15 = col[15];
-    blw_l1_survey_t found = {16U, BLW_R(0.0), BLW_R(1.0), false};
+    blw_l1_survey_t found = {16U, BLW_R(0.0), BLW_R(1.0)};
 
     const blw_real_t a0 = x0 * share;
     const blw_real_t d0 = S[0] - (a0 * x0);

@@ -72,10 +72,12 @@ blw_real_t blw_l1_statistic(const blw_l1_t *self)
     for (size_t g = 0U; g < m->n_groups; g++) {
         const blw_real_t norm  = one ? blw_la_abs(self->l[g]) : blw_l1_norm(m, g, self->l);
         const blw_real_t ratio = norm / m->c[g];
-        if (!(ratio <= BLW_REAL_MAX)) {
-            return ratio; /* a NaN must not pass for 0 */
+        if (!(ratio <= max)) {
+            if (!(ratio <= BLW_REAL_MAX)) {
+                return ratio; /* a NaN must not pass for 0 */
+            }
+            max = ratio;
         }
-        max = blw_la_max(max, ratio);
     }
     return max;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The end of a solve on the tableau (blw_l1_tableau.c): l, nu and x from the sweeps are corrected
  * by residuals formed in W and G, and held against (4) of blw_l1.h. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL,
@@ -78,7 +79,8 @@ static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
  *     [ dl_f  ]     [  e_f ]   [ w_f ]
  *     [ dnu_A ] = T [ -w_A ] + [ 0   ],     dx = F_f e_f - F_A dnu_A - P h.                     (3)
  * *bound = |dx|.  @return whether dx is a small part of the standard deviations of x. */
-static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+static BLW_APART bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x,
+                              blw_real_t *bound)
 {
     const blw_l1_model_t *const m      = self->model;
     blw_real_t *const           h      = &self->step[m->N];

@@ -78,7 +78,7 @@ static BLW_APART void survey(const blw_l1_t *self, blw_l1_survey_t *seen)
 {
     const blw_real_t *T_jj = self->T;
 
-    *seen = (blw_l1_survey_t){self->model->N, BLW_R(0.0), BLW_R(1.0), false};
+    *seen = (blw_l1_survey_t){self->model->N, BLW_R(0.0), BLW_R(1.0)};
     for (size_t j = 0U; j < self->model->N; j++) {
         blw_l1_look(seen, j, self->l[j], self->tau[j], self->z[j], *T_jj);
         T_jj += j + 2U;
@@ -228,7 +228,7 @@ static BLW_APART void pivot(blw_l1_t *self, blw_l1_info_t *info)
         const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
         unsigned         sweeps = 1U;
         column(self, i, self->step);
-        if (seen.turned) {
+        if (blw_l1_clipped(self, i)) {
             leave(self, i, &seen);
         } else if ((self->step[i] > BLW_L1_PIVOT_MIN) && (info->iterations < (BOLD * m->N))) {
             enter(self, i, s, &seen);
@@ -262,7 +262,7 @@ static BLW_APART void rebuild(blw_l1_t *self)
 
 /* nu = 0 on the rows of A that the verification found turned round; on the others l becomes nu.
  * @return whether there were any. */
-static bool drop_turned(blw_l1_t *self, const blw_real_t *zeta)
+static BLW_APART bool drop_turned(blw_l1_t *self, const blw_real_t *zeta)
 {
     bool dropped = false;
 

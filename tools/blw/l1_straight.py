@@ -84,7 +84,7 @@ def sweep(N: int) -> Code:
              "blw_real_t *const l = self->l;", "blw_real_t *const T = self->L;",
              "blw_real_t *const row = &T[(k * (k + 1U)) / 2U];",
              "blw_real_t *const below = &T[k];", *loads("col", x),
-             f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0), false}};", ""]
+             f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0)}};", ""]
     for i in range(N):
         lines.append(f"const blw_real_t a{i} = {x[i]} * share;")
         lines += [f"T[{at(i, j)}] = S[{at(i, j)}] - (a{i} * {x[j]});" for j in range(i)]

@@ -38,10 +38,9 @@ extern const blw_l1_ops_t blw_l1_newton_ops;
 
 /** What a pass over the rows of the tableau found. */
 typedef struct blw_l1_survey {
-    size_t     best;   /**< the row whose sweep gains most, or N */
-    blw_real_t gain;   /**< what it gains is gain / over */
-    blw_real_t over;   /**< > 0 */
-    bool       turned; /**< its nu has turned round: it leaves; any such one comes first */
+    size_t     best; /**< the row whose sweep gains most, or N */
+    blw_real_t gain; /**< what it gains is gain / over */
+    blw_real_t over; /**< > 0 */
 } blw_l1_survey_t;
 
 /** y = S x for S [N x N] packed lower. */

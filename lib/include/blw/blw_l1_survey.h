@@ -12,6 +12,9 @@ extern "C" {
  *  on those that are in. */
 #define BLW_L1_PIVOT_MIN (BLW_R(64.0) * BLW_REAL_EPS)
 
+/** A nu that has turned round comes first: its gain counts so many times. */
+#define BLW_L1_TURNED BLW_R(1e12)
+
 /** Row j has v = l_j or, with one end of low..high at 0, nu_j.  What a sweep on it gains where v is
  *  outside: the square of the way back / |T_jj|. */
 static inline void blw_l1_look(blw_l1_survey_t *seen, size_t j, blw_real_t v, blw_real_t low,
@@ -20,16 +23,15 @@ static inline void blw_l1_look(blw_l1_survey_t *seen, size_t j, blw_real_t v, bl
     if ((v > high) || (v < low)) {
         const blw_real_t excess = (v > high) ? (v - high) : (low - v);
         const blw_real_t gain   = excess * excess;
-        if ((gain * seen->over) > (seen->gain * T_jj)) { /* or T_jj < 0: it has nu */
+        if ((gain * seen->over) > (seen->gain * T_jj)) { /* always where T_jj < 0 */
             const bool       turned = !((low < BLW_R(0.0)) && (high > BLW_R(0.0)));
             const blw_real_t size   = turned ? -T_jj : T_jj;
             const blw_real_t over   = (size < BLW_L1_PIVOT_MIN) ? BLW_L1_PIVOT_MIN : size;
-            const bool       more   = (gain * seen->over) > (seen->gain * over);
-            if ((turned == seen->turned) ? more : turned) {
-                seen->best   = j;
-                seen->gain   = gain;
-                seen->over   = over;
-                seen->turned = turned;
+            const blw_real_t counts = turned ? (BLW_L1_TURNED * gain) : gain;
+            if ((counts * seen->over) > (seen->gain * over)) {
+                seen->best = j;
+                seen->gain = counts;
+                seen->over = over;
             }
         }
     }
