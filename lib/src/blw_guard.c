@@ -232,12 +232,25 @@ static void report(blw_guard_t *self, blw_mask_t used, blw_estimator_out_t *out)
     }
 }
 
-/* Everything between (1) and (4); fills the outcome, statistic and bound. */
+/* (2) from an l that fails the certificate; fills outcome and bound. */
+static BLW_APART void solve(blw_guard_t *self, blw_estimator_out_t *out)
+{
+    bool converged = true;
+
+    out->bound = self->model->solver->solve(self, &converged);
+    if (!(out->bound <= BLW_REAL_MAX)) { /* only at the limit of the numbers */
+        out->bound = BLW_REAL_MAX;
+        converged  = false;
+    }
+    out->outcome = (uint8_t)(converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND);
+}
+
+/* Everything between (1) and (5); fills the outcome, statistic and bound. */
 static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out)
 {
-    const blw_guard_model_t *const model     = self->model;
-    bool                           converged = true;
-    blw_real_t                     largest   = test(self);
+    const blw_real_t  k       = self->model->k;
+    const blw_real_t *tau     = self->e;
+    blw_real_t        largest = test(self);
 
     self->excluded = 0U;
     self->updates  = 0U;
@@ -248,17 +261,11 @@ static void decide(blw_guard_t *self, blw_mask_t *used, blw_estimator_out_t *out
     out->statistic = blw_la_sqrt(largest);
     out->bound     = BLW_R(0.0);
     out->outcome   = (uint8_t)BLW_OUTCOME_KALMAN;
-    if ((largest <= (model->k * model->k)) && (self->attacked == 0U)) {
-        fuse(self, self->e);
-        return;
+    if (!(largest <= (k * k)) || (self->attacked != 0U)) {
+        solve(self, out);
+        tau = self->eta;
     }
-    out->bound = model->solver->solve(self, &converged);
-    if (!(out->bound <= BLW_REAL_MAX)) { /* only at the limit of the numbers */
-        out->bound = BLW_REAL_MAX;
-        converged  = false;
-    }
-    out->outcome = (uint8_t)(converged ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_BOUND);
-    fuse(self, self->eta);
+    fuse(self, tau);
 }
 
 /* (1) in the usual case: every sample is there and nothing is near a bound. */
