@@ -19,7 +19,7 @@ void blw_guard_multipliers(const blw_guard_model_t *model, const blw_real_t *tau
     size_t            row = 0U;
 
     if (model->multiply != NULL) {
-        model->multiply(tau, l);
+        model->multiply(model->S, tau, l);
         return;
     }
     for (size_t i = 0U; i < m; i++) {
@@ -46,7 +46,7 @@ void blw_guard_move(blw_guard_t *self, size_t i, const blw_real_t *step)
         l[a] += step[a];
     }
     if (model->move != NULL) {
-        model->move(i, step, self->l);
+        model->move(model->S, i, step, self->l);
         return;
     }
     if (i > 0U) {

@@ -226,10 +226,10 @@ static bool advance_kernel(const blw_real_t *input, const blw_real_t *y, const b
     return true;
 }
 
-static void multiply_kernel(const blw_real_t *tau, blw_real_t *l)
+static void multiply_kernel(const blw_real_t *S, const blw_real_t *tau, blw_real_t *l)
 {
     for (size_t i = 0U; i < 3U; i++) {
-        l[i] = tau[i] + (guard_S[0] * (tau[(i + 1U) % 3U] + tau[(i + 2U) % 3U]));
+        l[i] = tau[i] + (S[0] * (tau[(i + 1U) % 3U] + tau[(i + 2U) % 3U]));
     }
     kernel_calls++;
 }
@@ -262,10 +262,10 @@ static void fuse_kernel(const blw_real_t *tau, const blw_real_t *e, const blw_re
     kernel_calls++;
 }
 
-static void move_kernel(size_t i, const blw_real_t *change, blw_real_t *l)
+static void move_kernel(const blw_real_t *S, size_t i, const blw_real_t *change, blw_real_t *l)
 {
     for (size_t j = 0U; j < 3U; j++) {
-        l[j] += (j == i) ? BLW_R(0.0) : (guard_S[0] * change[0]);
+        l[j] += (j == i) ? BLW_R(0.0) : (S[0] * change[0]);
     }
     kernel_calls++;
 }

@@ -2,6 +2,8 @@
 """Straight-line C for the products of `guard` (see straight.py): the same bits as the loops of
 lib/src/blw_guard*.c, whose order of summation every function here follows."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,9 @@ STRIP = 3
 #: Longest functions in multiply-adds; 16 bytes of flash for each.
 MOST_TERMS = 360
 MOST_FUSION_TERMS = 640
+
+#: Share of different numbers in S from which on they are read from its table.
+MOST_DIFFER = 0.9
 
 
 def advance(model: Model, kalman: Kalman, fusion: Fusion) -> Code | None:
@@ -68,26 +73,68 @@ def filter_lines(i: int, Lam: Array, b: Array, reach: int) -> list[str]:
     return lines
 
 
+@dataclass(frozen=True)
+class Blocks:
+    """S below its diagonal blocks in the source: read from the table, which needs no second copy of
+    its numbers; or, where many are equal, written in, so that their products are computed once."""
+
+    S: Array  #: [N x N]
+    r: int
+    read: bool
+
+    @classmethod
+    def of(cls, fusion: Fusion) -> "Blocks":
+        S = straight.flushed(fusion.S)
+        rows, columns = np.indices(S.shape) // fusion.r
+        used = np.abs(S[(rows > columns) & (S != 0.0)]).astype(np.float32)
+        return cls(S, fusion.r, len(np.unique(used)) > MOST_DIFFER * used.size)
+
+    def tail(self, terms: list[tuple[int, int, str]]) -> str:
+        """" + (S_ac * x)" and so on, over terms (a, c, x): a sum that goes on."""
+        if self.read:
+            return "".join(f" + (S[{self.place(a, c)}] * {x})" for a, c, x in terms if self.S[a, c])
+        return tail(*self._split(terms))
+
+    def total(self, terms: list[tuple[int, int, str]]) -> str:
+        """The same from its first term on; empty if all are zero."""
+        return self.tail(terms)[len(" + "):] if self.read else total(*self._split(terms))
+
+    def place(self, a: int, c: int) -> int:
+        """Where blw_guard_model_t.S has S_ac among its strips."""
+        i, row = divmod(a, self.r)
+        first = row - row % STRIP
+        width = min(STRIP, self.r - first)
+        return self.r**2 * i * (i - 1) // 2 + first * i * self.r + c * width + row - first
+
+    def _split(self, terms: list[tuple[int, int, str]]) -> tuple[Array, list[str]]:
+        return np.array([self.S[a, c] for a, c, _ in terms]), [x for _, _, x in terms]
+
+    @property
+    def head(self) -> list[str]:
+        """What the body of a function starts with."""
+        return [] if self.read else ["(void)S;"]
+
+
 def multiply(fusion: Fusion) -> Code | None:
     """blw_guard_multiply_kernel_t: l = S tau."""
     r, N = fusion.r, fusion.m * fusion.r
     if N * (N - r) > MOST_TERMS:
         return None
-    S = straight.flushed(fusion.S)
+    S = Blocks.of(fusion)
     t = names("t", N)
-    lines = loads("tau", t)
+    lines = [*S.head, *loads("tau", t)]
     for i in range(fusion.m):
         for a in range(i * r, (i + 1) * r):
             own = t[a] if a - i * r < fusion.rank[i] else "BLW_R(0.0)"
-            lower = total(S[a, : i * r], t[: i * r])
+            lower = S.total([(a, c, t[c]) for c in range(i * r)])
             lines += statement(f"blw_real_t l{a} =", f"{own} + ({lower});" if lower else f"{own};")
         for start in range(i * r, (i + 1) * r, STRIP):
             rows = range(start, min(start + STRIP, (i + 1) * r))
             for c in range(i * r):
-                added = tail(S[list(rows), c], [t[a] for a in rows])
+                added = S.tail([(a, c, t[a]) for a in rows])
                 lines += statement(f"l{c} =", f"l{c}{added};") if added else []
     lines += [f"l[{a}] = l{a};" for a in range(N)]
-    return Code("void", "const blw_real_t *tau, blw_real_t *l", tuple(lines),
+    return Code("void", "const blw_real_t *S, const blw_real_t *tau, blw_real_t *l", tuple(lines),
                 f"l = S tau: {N * (N - r)} multiply-adds")
 
 
@@ -126,31 +173,32 @@ def move(fusion: Fusion) -> Code | None:
     N = m * r
     if N * (N - r) > MOST_TERMS:
         return None
-    S = straight.flushed(fusion.S)
+    S = Blocks.of(fusion)
     d = names("d", r)
-    lines = [*loads("step", d), "", "switch (i) {"]
+    lines = [*S.head, *loads("step", d), "", "switch (i) {"]
     for i in range(m):
         lines.append(f"case {i}:" if i < m - 1 else "default:")
         for c in range(N):
-            lines += [f"    {line}" for line in moved(S, c, i, r, d)]
+            lines += [f"    {line}" for line in moved(S, c, i, d)]
         lines.append("    break;")
     lines.append("}")
-    return Code("void", "size_t i, const blw_real_t *step, blw_real_t *l", tuple(lines),
+    return Code("void", "const blw_real_t *S, size_t i, const blw_real_t *step, blw_real_t *l",
+                tuple(lines),
                 f"l_j += S_ji step for all sensors j but i: {r * (N - r)} multiply-adds")
 
 
-def moved(S: Array, c: int, i: int, r: int, d: list[str]) -> list[str]:
+def moved(S: Blocks, c: int, i: int, d: list[str]) -> list[str]:
     """Row c of the other sensors: to the strips of sensor i's rows, or the sum over its columns."""
-    block = S[c, i * r : (i + 1) * r]
-    if c // r == i or not block.any():
+    r = S.r
+    if c // r == i:
         return []
     if c // r > i:
-        return statement(f"l[{c}] =", f"l[{c}] + ({total(block, d)});")
-    value = f"l[{c}]"
-    for start in range(0, r, STRIP):
-        part = total(block[start : start + STRIP], d[start : start + STRIP])
-        value += f" + ({part})" if part else ""
-    return statement(f"l[{c}] =", f"{value};")
+        parts = [S.total([(c, i * r + a, d[a]) for a in range(r)])]
+    else:
+        strips = [range(start, min(start + STRIP, r)) for start in range(0, r, STRIP)]
+        parts = [S.total([(i * r + a, c, d[a]) for a in rows]) for rows in strips]
+    added = "".join(f" + ({part})" for part in parts if part)
+    return statement(f"l[{c}] =", f"l[{c}]{added};") if added else []
 
 
 def fuse(fusion: Fusion, Xu: Array) -> Code | None:

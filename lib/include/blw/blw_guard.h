@@ -50,8 +50,9 @@ extern const blw_guard_solver_t blw_guard_many_ops;
 typedef bool (*blw_guard_advance_kernel_t)(const blw_real_t *u, const blw_real_t *y,
                                            const blw_real_t *x_ref, const blw_real_t *eta,
                                            blw_real_t *x_bar, blw_real_t *e);
-/** l = S tau */
-typedef void (*blw_guard_multiply_kernel_t)(const blw_real_t *tau, blw_real_t *l);
+/** l = S tau; S as in the model, also below: code that reads the table needs no copy of it. */
+typedef void (*blw_guard_multiply_kernel_t)(const blw_real_t *S, const blw_real_t *tau,
+                                            blw_real_t *l);
 /** squares [m] = |l_i|^2 */
 typedef void (*blw_guard_squares_kernel_t)(const blw_real_t *l, blw_real_t *squares);
 /** average += gain (l - average), squares [m] = |average_i|^2 */
@@ -62,7 +63,8 @@ typedef void (*blw_guard_fuse_kernel_t)(const blw_real_t *tau, const blw_real_t 
                                         const blw_real_t *x_bar, blw_real_t *x_ref,
                                         blw_real_t *eta);
 /** l_j += S_ji step for all sensors j but i. */
-typedef void (*blw_guard_move_kernel_t)(size_t i, const blw_real_t *step, blw_real_t *l);
+typedef void (*blw_guard_move_kernel_t)(const blw_real_t *S, size_t i, const blw_real_t *step,
+                                        blw_real_t *l);
 
 typedef struct blw_guard_model {
     blw_model_t       head;
