@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from blw import canonical, coordinates, kalman
+from blw import canonical, canonical_form, kalman
 from blw.build import ROOT, simulator
 from blw.design import Design, document, json_text, plant_tables
 from blw.l1_tuning import BenignLoss
@@ -72,8 +72,8 @@ def benign_of_admm(gamma: float, rho: float) -> float:
     model = parse(tomllib.loads(MODEL.read_text()), str(MODEL))
     gains = kalman.steady_state(model.A, model.C, model.W, model.R)
     filters = local_filters(model, gains)
-    space = coordinates.choose(modes_of(model.A, model.C), "jordan", gains.Acl)
-    fused = canonical.fusion(np.ones(model.m), filters, space, canonical.transforms(filters, space))
+    form = canonical_form.choose(filters, modes_of(model.A, model.C), "jordan")
+    fused = canonical.fusion(np.ones(model.m), filters, form)
     loss = BenignLoss(fused.reduced, fused.groups, fused.F, float(np.trace(gains.P)), rho, 3000,
                       samples=10_000)
     return 1.0 + loss(gamma)

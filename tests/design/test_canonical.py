@@ -8,7 +8,7 @@ import golden
 import numpy as np
 import pytest
 
-from blw import canonical, coordinates, kalman, model, modes, options
+from blw import canonical, canonical_form, kalman, model, modes, options
 from blw.errors import DesignError, ModelError
 from blw.local_filters import local_filters
 
@@ -21,8 +21,8 @@ def shipped(name):
 
 
 def parts(plant, gains):
-    space = coordinates.choose(modes.modes_of(plant.A, plant.C), "jordan", gains.Acl)
-    return local_filters(plant, gains), space
+    filters = local_filters(plant, gains)
+    return filters, canonical_form.choose(filters, modes.modes_of(plant.A, plant.C), "jordan")
 
 
 @pytest.mark.parametrize("name", ["pendulum", "drone6", "torsion", "grid4"])
@@ -30,7 +30,7 @@ def test_transforms_turn_local_states_into_modes_and_white_noise(name):
     plant, gains = shipped(name)
     filters, form = parts(plant, gains)
     n = plant.n
-    for i, P in enumerate(canonical.transforms(filters, form)):
+    for i, P in enumerate(form.P):
         rows, observed = slice(i * n, i * n + n), form.observed[i]
         G, W = filters.G[rows] @ form.X, filters.W[rows, rows]
         assert np.abs(P @ G - np.diag(observed)).max() < 1e-6

@@ -9,7 +9,8 @@ from conftest import Run
 from golden_case import build, estimates, load, replay
 from sim_case import design_text, summary
 
-from blw import canonical, coordinates, kalman
+from blw import canonical, kalman
+from blw.canonical_form import CanonicalForm, choose
 from blw.design import Design, plant_tables
 from blw.jordan_form import JordanForm
 from blw.local_filters import local_filters
@@ -36,15 +37,16 @@ def design(golden: dict, gamma: str) -> tuple[Design, np.ndarray, np.ndarray]:
     reference = golden["canonical"]
     model = build(golden, "lasso", {})
     gains = kalman.steady_state(model.A, model.C, model.W, model.R)
-    space = coordinates.choose(modes_of(model.A, model.C), "auto", gains.Acl)
     filters = local_filters(model, gains)
+    ours = choose(filters, modes_of(model.A, model.C), "auto")
     P = reference_transforms(reference, filters.form)
     weights = reference["sensor_weight"]
     options = canonical.Options(gamma=float(gamma), weights=weights)
-    designed = canonical.assemble(model, gains, options, np.array(weights), filters, space, P)
+    form = CanonicalForm(filters, ours.modes, ours.X, P)
+    designed = canonical.assemble(model, gains, options, np.array(weights), filters, form)
     methods = {"kalman": kalman.design(model, gains, kalman.Options()), "canonical": designed}
     whole = Design(model, plant_tables(model, gains), methods)
-    return whole, P, canonical.transforms(filters, space)
+    return whole, P, ours.P
 
 
 @pytest.mark.parametrize("precision", ["f64", "f32"])
@@ -95,7 +97,7 @@ p = 2
 coordinates = "{coordinates}"
 """
 
-TWO_RAMPS = """
+LOSSY_RAMPS = """
 model = "car.toml"
 steps = 1000
 seed = 1
@@ -105,28 +107,35 @@ kind = "ramp"
 value = 3.0
 from = 300
 to = 700
+[[attack]]
+sensors = ["y1", "y2", "y3", "y4", "y7", "y8"]
+kind = "drop"
+probability = 0.6
+from = 200
+to = 900
 """
 
 
-def excess(folder: Path, program: Run, choice: str) -> tuple[float, float]:
-    """Mean square error of `canonical` over the oracle's, during and after the attack."""
+def excess(folder: Path, program: Run, choice: str) -> dict[str, float]:
+    """Mean square error of `canonical` over the oracle's, during and after the attacks."""
     folder.mkdir()
     (folder / "car.toml").write_text(CAR.format(coordinates=choice))
     (folder / "design.json").write_text(design_text(folder / "car.toml", ("kalman", "canonical")))
-    (folder / "run.toml").write_text(TWO_RAMPS)
+    (folder / "run.toml").write_text(LOSSY_RAMPS)
     done = program("run", folder / "run.toml", "--design", folder / "design.json",
                    "--method", "canonical", "--out", folder / "out")
     assert done.returncode == 0, done.stderr
     told = summary(folder / "out")["methods"]
-    return tuple(told["canonical"]["mse"][phase] / told["oracle"]["mse"][phase]
-                 for phase in ("during", "after"))
+    return {phase: told["canonical"]["mse"][phase] / told["oracle"]["mse"][phase]
+            for phase in ("during", "after")}
 
 
-def test_run_given_modes_that_nearly_agree_survives_two_ramps(tmp_path: Path, blw_sim: Run) -> None:
-    during, after = excess(tmp_path / "auto", blw_sim, "auto")
-    assert during < 2.0
-    assert after < 2.0
-    # as the paper has it, the two coordinates of the speed are fused apart
-    during, after = excess(tmp_path / "jordan", blw_sim, "jordan")
-    assert during > 5.0
-    assert after > 100.0
+def test_run_given_nearly_equal_modes_and_lost_samples_survives_two_ramps(
+    tmp_path: Path, blw_sim: Run
+) -> None:
+    ours = excess(tmp_path / "auto", blw_sim, "auto")
+    assert ours["during"] < 4.0
+    assert ours["after"] < 4.0
+    # in the paper's coordinates what stands in for the lost samples drives the estimate away: by a
+    # factor of 5 in double, of 1000 in float
+    assert excess(tmp_path / "jordan", blw_sim, "jordan")["during"] > 2.0 * ours["during"]

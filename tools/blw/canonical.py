@@ -3,17 +3,12 @@
 
 The local filters are those of `lasso`; xi_i = P_i zeta_i with P_i G_i X = H_i, where A X = X J is
 the real Jordan form of a non-derogatory A and H_i is diagonal: 1 where sensor i observes the
-coordinate, 0 elsewhere ([N] Theorem 2; blw.coordinates tells where X is another).  Then
+coordinate, 0 elsewhere ([N] Theorem 2; blw.canonical_form tells where X is another).  Then
 
     minimise over x, mu, nu:  1/2 mu' M^-1 mu + gamma sum_i v_i sum_g w_g |nu_ig|,              (1)
     xi = H X^-1 x + mu + nu,   M = P~ W P~',                                                 (2)
 
 with v_i the weight of sensor i and w_g = sqrt2 for a complex pair of A.
-
-P_i is not unique where a sensor misses a mode.  Here the observed coordinates are the best linear
-unbiased estimates from zeta_i, (O' W_ii^-1 O)^-1 O' W_ii^-1 with O the observed columns of G_i X;
-the other rows see noise only and are orthonormal in W_ii: both depend on the model alone, up to a
-rotation of the latter, which is fixed in local coordinates.
 
 With v_i = 1 a mode that an even number of sensors sees has many minimisers (median of an even
 number); weights without equal partial sums make it one.  (1) bounds the influence of any p
@@ -29,9 +24,9 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from blw import l1, lasso
-from blw.coordinates import Choice, Coordinates, choose
+from blw.canonical_form import CanonicalForm, Choice, choose
 from blw.design import Designed
-from blw.errors import DesignError, ModelError
+from blw.errors import ModelError
 from blw.kalman import Kalman
 from blw.local_filters import LocalFilters, local_filters
 from blw.model import Model
@@ -47,9 +42,6 @@ OFFSETS = (0.0, 0.03, 0.07, 0.13, 0.21, 0.33)
 WIDEST = 0.33
 GOLDEN_SECTION = 0.6180339887498949
 
-#: Largest error of P_i G_i X = H_i that is taken for rounding.
-RESIDUAL = 1e-6
-
 #: Partial sums of weights that are closer than this are equal.
 EQUAL_SUMS = 1e-6
 
@@ -63,7 +55,7 @@ class Options(lasso.Options):
 
     #: of every sensor's penalty; they must vary by less than (p + 1) / p
     weights: list[float] | None = None
-    #: of the fusion, see blw.coordinates
+    #: X, see blw.canonical_form
     coordinates: Choice = "auto"
     #: printed: [N] as it stands, all weights 1, Jordan coordinates
     variant: Literal["corrected", "printed"] = "corrected"
@@ -73,30 +65,29 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables and figures of `canonical` for one model.  Raises ModelError, DesignError."""
     lasso.check_options(options, model, NAME)
     weights = sensor_weights(model, options)
-    choice = "jordan" if options.variant == "printed" else options.coordinates
-    space = choose(modes_of(model.A, model.C), choice, kalman.Acl)
+    modes = modes_of(model.A, model.C)
     filters = local_filters(model, kalman)
-    P = transforms(filters, space)
-    return assemble(model, kalman, options, weights, filters, space, P)
+    form = choose(filters, modes, "jordan" if options.variant == "printed" else options.coordinates)
+    return assemble(model, kalman, options, weights, filters, form)
 
 
 def assemble(model: Model, kalman: Kalman, options: Options, weights: Array,
-             filters: LocalFilters, space: Coordinates, P: Array) -> Designed:
-    """Tables and figures for given transforms P [m x n x n] with P_i G_i X = H_i."""
-    fused = fusion(weights, filters, space, P)
+             filters: LocalFilters, form: CanonicalForm) -> Designed:
+    """Tables and figures in a given canonical form."""
+    fused = fusion(weights, filters, form)
     designed = lasso.assemble(NAME, fused, filters, model, kalman, options)
-    return Designed(designed.tables, designed.info | figures(model, options, weights, space, P),
+    return Designed(designed.tables, designed.info | figures(model, options, weights, form),
                     designed.mem)
 
 
-def fusion(weights: Array, filters: LocalFilters, space: Coordinates, P: Array) -> lasso.Fusion:
-    """The problem (1) in reduced form for given transforms P [m x n x n]."""
-    m, n = P.shape[:2]
-    local = space.modes.form.groups()
+def fusion(weights: Array, filters: LocalFilters, form: CanonicalForm) -> lasso.Fusion:
+    """The problem (1) in reduced form."""
+    m, n = form.observed.shape
+    P, local = form.P, form.modes.form.groups()
     rows = [slice(i * n + first, i * n + first + size) for i in range(m) for first, size in local]
     stacked = scipy.linalg.block_diag(*P)
     M = stacked @ filters.W @ stacked.T
-    H = space.observed.reshape(m * n, 1) * np.tile(np.linalg.inv(space.X), (m, 1))
+    H = form.observed.reshape(m * n, 1) * np.tile(np.linalg.inv(form.X), (m, 1))
     reduced = l1.reduced((M + M.T) / 2.0, H, rows)
     deviation = np.sqrt(np.diag(filters.W)).reshape(m, n)
     filter_scale = 1.0 / block_means(filters, deviation).ravel()
@@ -107,17 +98,18 @@ def fusion(weights: Array, filters: LocalFilters, space: Coordinates, P: Array) 
         response=P @ lasso.steady_response(filters),
         filter_scale=filter_scale,
         P=reduced.scale.reshape(m, n, 1) * P / filter_scale.reshape(m, 1, n),
-        ambiguous=ambiguous(weights, space.observed),
+        ambiguous=ambiguous(weights, form.observed),
     )
 
 
-def figures(model: Model, options: Options, weights: Array, space: Coordinates, P: Array) -> dict:
+def figures(model: Model, options: Options, weights: Array, form: CanonicalForm) -> dict:
     """What a reader wants to know beside the figures of lasso."""
     return {
         "variant": options.variant,
-        "coordinates_changed": space.changed,
+        "coordinates_changed": form.changed,
+        "coordinates_growth": form.growth,
         "weights": weights.tolist(),
-        "ambiguous": ambiguous(weights, space.observed),
+        "ambiguous": ambiguous(weights, form.observed),
         "modes": [
             {
                 "re": mode.eigenvalue.real,
@@ -125,10 +117,10 @@ def figures(model: Model, options: Options, weights: Array, space: Coordinates, 
                 "multiplicity": mode.multiplicity,
                 "seen_by": [model.sensors[i] for i in np.flatnonzero(mode.seen)],
             }
-            for mode in space.modes.modes
+            for mode in form.modes.modes
         ],
-        "cond_P": float(max(np.linalg.cond(P_i) for P_i in P)),
-        "cond_X": float(np.linalg.cond(space.X)),
+        "cond_P": float(max(np.linalg.cond(P_i) for P_i in form.P)),
+        "cond_X": float(np.linalg.cond(form.X)),
     }
 
 
@@ -183,52 +175,3 @@ def block_means(filters: LocalFilters, rows: Array) -> Array:
     for block in filters.form.blocks:
         means[:, block.rows] = np.sqrt(np.mean(rows[:, block.rows] ** 2, axis=1, keepdims=True))
     return means
-
-
-def transforms(filters: LocalFilters, space: Coordinates) -> Array:
-    """P [m x n x n].  Raises DesignError if they do not exist or cannot be computed."""
-    observed = space.observed
-    m, n = observed.shape
-    if filters.r < n:
-        raise DesignError(f"A - K C A is derogatory: its {filters.r} local states per sensor cannot"
-                          f" hold the {n} modes of A; use guard")
-    P = np.empty((m, n, n))
-    for i in range(m):
-        rows = slice(i * n, i * n + n)
-        G_i = filters.G[rows] @ space.X
-        P[i] = transform(G_i[:, observed[i]], filters.W[rows, rows], observed[i])
-        error = np.abs(P[i] @ G_i - np.diag(observed[i])).max()
-        if not error <= RESIDUAL:
-            raise DesignError(f"sensor {i + 1} sees some mode too faintly to separate it: P G - H ="
-                              f" {error:.1e}, cond(P) = {np.linalg.cond(P[i]):.1e}; use guard")
-    return P
-
-
-def transform(O: Array, W: Array, observed: Array) -> Array:  # noqa: E741
-    """P_i [n x n] for observed columns O [n x k] of G_i X and covariance W [n x n] of zeta_i."""
-    deviation = np.sqrt(np.diag(W))
-    L = np.linalg.cholesky(W / np.outer(deviation, deviation))
-    whitened = scipy.linalg.solve_triangular(L, O / deviation[:, None], lower=True)
-    Q, T = np.linalg.qr(whitened)
-    P = np.empty_like(W)
-    P[observed] = np.linalg.solve(T, Q.T)
-    P[~observed] = complement(Q)
-    return scipy.linalg.solve_triangular(L, P.T, lower=True, trans="T").T / deviation
-
-
-def complement(Q: Array) -> Array:
-    """[n - k x n] orthonormal rows that complete the orthonormal columns Q [n x k].
-
-    Gram-Schmidt on the unit vectors, twice each: unlike a factorisation with signs and pivots of
-    its own, this does not depend on the linear algebra package.
-    """
-    n, k = Q.shape
-    basis, found = Q, []
-    for unit in np.eye(n):
-        rest = unit
-        for _ in range(2):
-            rest = rest - basis @ (rest @ basis)
-        if len(found) < n - k and np.linalg.norm(rest) > 1.0 / (2.0 * n):
-            found.append(rest / np.linalg.norm(rest))
-            basis = np.column_stack([basis, found[-1]])
-    return np.array(found).reshape(n - k, n)

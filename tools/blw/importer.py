@@ -93,7 +93,7 @@ def model_mapping(raw: Mapping[str, Any], where: str, name: str, p: int | None,
     if shared:
         attack["groups"] = shared
     return {"name": name, "dt_s": raw["dt"], "plant": plant, "attack": attack,
-            "method": {"canonical": {"coordinates": "orthogonal"}}}
+            "method": {"canonical": {"coordinates": "steady"}}}
 
 
 def model_toml(mapping: Mapping[str, Any]) -> str:
