@@ -1,34 +1,33 @@
 /* SPDX-License-Identifier: MIT */
-/* Newton engine for (2) in blw_l1.h, groups of one row or two, by continuation [Madsen, Nielsen,
- * "A finite smoothing algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)].
- * |nu_g| is rounded off below w = kappa width_g, width_g = the benign standard deviation of zeta_g:
- *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|.                                (1)
- * The objective is then smooth, l_g = c_g nu_g / max(|nu_g|, w), and a group is either inside, where
- * this is linear, or outside, where only a pair can still turn.  A Newton step solves the optimality
- * conditions for the present groups inside and outside (blw_l1_newton_step.c); a search along it
- * keeps the objective falling.  Once that has settled, kappa falls by a fixed ratio, and where no
- * group has changed sides for one kappa, kappa = 0 is tried: steps until x stands, verified by (4).
- * Few rows are inside in the end, often hardly more than n, so that a step is cheap.  Noise is fresh
- * in every sample and so are most sides: only what a gross attack has clipped is taken over from the
- * last solve. */
+/* Newton engine for (2) in blw_l1.h, groups of one row or two.  A group is either inside, nu_g = 0, or
+ * outside, l_g = c_g nu_g / |nu_g|, where only a pair can still turn.  A Newton step solves the
+ * optimality conditions for the present groups inside and outside (blw_l1_newton_step.c); few rows are
+ * inside in the end, often hardly more than n, so that a step is cheap.  The sides come from passes of
+ * alternating directions (blw_l1_newton_start.c); mostly a few steps correct them until x stands,
+ * verified by (4).  Where they do not, continuation [Madsen, Nielsen, "A finite smoothing algorithm for
+ * linear l1 estimation", SIAM J. Optimization 3 (1993)]: |nu_g| is rounded off below
+ * w = kappa width_g, width_g = the benign standard deviation of zeta_g,
+ *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|,                                (1)
+ * which makes the objective smooth, l_g = c_g nu_g / max(|nu_g|, w), inside where that is linear; a
+ * search along each step keeps the objective falling.  Once that has settled, kappa falls by a fixed
+ * ratio, and where no group has changed sides for one kappa, kappa = 0 is tried again. */
 #include "blw_l1_newton.h"
 #include "blw_cold.h"
 
-/* First kappa, ratio of the next, and the least for which it is worth while. */
-#define KAPPA_FIRST BLW_R(0.03)
-#define KAPPA_GROSS BLW_R(0.1) /* the first, relative to l_g / width_g, if that is larger */
+/* Ratio of the next kappa, and the least for which it is worth while. */
 #define KAPPA_RATIO BLW_R(0.2)
 #define KAPPA_LAST  BLW_R(1e-6)
-
-/* |nu_g| / width_g from which a group is taken to be under the same attack in the next solve. */
-#define GROSS BLW_R(10.0)
+#define KAPPA_RISE  BLW_R(25.0) /* while none has settled */
 
 /* Most steps for one kappa, and for kappa = 0. */
 #define STEPS       12U
-#define STEPS_FINAL 8U
+#define STEPS_FINAL 10U
 
 /* Most groups that may change sides in one step with kappa = 0. */
 #define WRONG 6U
+
+/* |l_g| / c_g that rounding may leave inside. */
+#define SLACK (BLW_R(1.0) + (BLW_R(64.0) * BLW_REAL_EPS))
 
 /* Least share of a step that is worth another. */
 #define STUCK BLW_R(1e-9)
@@ -52,7 +51,7 @@
 #endif
 
 /* Direction and side of every group for the present nu; with keep, only directions.
- * @return groups that changed sides. */
+ * @return groups that changed sides or turned round. */
 static size_t aim(const blw_l1_newton_t *at, bool keep)
 {
     blw_l1_t *const             self  = at->l1;
@@ -65,10 +64,11 @@ static size_t aim(const blw_l1_newton_t *at, bool keep)
         blw_real_t       nu[2];
         const blw_real_t norm    = blw_l1_nu(at, g, nu);
         const bool       outside = (keep && before) || (!keep && (norm > (at->kappa * self->A[g])));
+        const bool       turned  = blw_la_dot(blw_l1_size(m, g), nu, &self->dir[i]) < BLW_R(0.0);
         for (size_t j = i; (j < m->first[g + 1U]) && !(keep && (norm <= BLW_R(0.0))); j++) {
             self->dir[j] = outside ? (nu[j - i] / norm) : BLW_R(0.0);
         }
-        moved += (outside != before) ? 1U : 0U;
+        moved += ((outside != before) || turned) ? 1U : 0U;
     }
     return moved;
 }
@@ -136,6 +136,29 @@ static void move(blw_l1_newton_t *at, blw_real_t alpha)
     blw_la_axpy(self->model->n, alpha - BLW_R(1.0), self->step, at->x);
 }
 
+/* Keep the point behind A, and go back to it. */
+static void keep(blw_l1_newton_t *at)
+{
+    const blw_l1_t *const       self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+    blw_real_t *const           kept = &self->A[m->n_groups];
+
+    blw_la_copy(m->N, self->tau, kept);
+    blw_la_copy(m->N, self->l, &kept[m->N]);
+    blw_la_copy(m->n, at->x, &kept[2U * (size_t)m->N]);
+}
+
+static void restore(blw_l1_newton_t *at)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+    const blw_real_t *const     kept = &self->A[m->n_groups];
+
+    blw_la_copy(m->N, kept, self->tau);
+    blw_la_copy(m->N, &kept[m->N], self->l);
+    blw_la_copy(m->n, &kept[2U * (size_t)m->N], at->x);
+}
+
 /* The next kappa: nu_g = D l_g on groups inside, and l and x follow. */
 static void tighten(blw_l1_newton_t *at)
 {
@@ -157,6 +180,14 @@ static void tighten(blw_l1_newton_t *at)
     blw_la_gemv(m->n, m->N, m->F, self->dz, self->step);
     blw_la_axpy(m->n, BLW_R(1.0), self->step, at->x);
     move(at, BLW_R(1.0));
+}
+
+/* A larger kappa, from the point that was kept. */
+static void loosen(blw_l1_newton_t *at)
+{
+    at->kappa *= KAPPA_RISE;
+    restore(at);
+    (void)aim(at, false);
 }
 
 /* Groups whose nu has turned round go inside.  @return their number. */
@@ -194,7 +225,7 @@ static size_t let_out(const blw_l1_newton_t *at)
 
     for (size_t g = 0U; g < m->n_groups; g++) {
         const blw_real_t norm = blw_l1_norm(m, g, self->l);
-        if (!(norm <= (m->c[g] + blw_l1_slack(m->c[g]))) && !blw_l1_outside(self, g, m->first[g])) {
+        if (!(norm <= (SLACK * m->c[g])) && !blw_l1_outside(self, g, m->first[g])) {
             count++;
             if ((norm / m->c[g]) > most) {
                 most  = norm / m->c[g];
@@ -222,29 +253,6 @@ static blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
         *small                = *small && ((dx[j] * dx[j]) <= (SMALL * SMALL * P_jj));
     }
     return blw_la_norm(m->n, dx);
-}
-
-/* Keep the point behind A, and go back to it. */
-static void keep(blw_l1_newton_t *at)
-{
-    const blw_l1_t *const       self = at->l1;
-    const blw_l1_model_t *const m    = self->model;
-    blw_real_t *const           kept = &self->A[m->n_groups];
-
-    blw_la_copy(m->N, self->tau, kept);
-    blw_la_copy(m->N, self->l, &kept[m->N]);
-    blw_la_copy(m->n, at->x, &kept[2U * (size_t)m->N]);
-}
-
-static void restore(blw_l1_newton_t *at)
-{
-    blw_l1_t *const             self = at->l1;
-    const blw_l1_model_t *const m    = self->model;
-    const blw_real_t *const     kept = &self->A[m->n_groups];
-
-    blw_la_copy(m->N, kept, self->tau);
-    blw_la_copy(m->N, &kept[m->N], self->l);
-    blw_la_copy(m->n, &kept[2U * (size_t)m->N], at->x);
 }
 
 /* Steps with kappa = 0.  @return whether they end in a minimum. */
@@ -293,73 +301,16 @@ static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
     return settled;
 }
 
-/* The point of the last kappa that settled; without one nu = 0. */
-static void fall_back(blw_l1_newton_t *at, bool any)
+/* kappa = 0 from the point that was kept, or back to it.  @return whether that is the minimum. */
+static bool try_to_finish(blw_l1_newton_t *at, blw_l1_info_t *info)
 {
-    if (any) {
+    const bool done = finish(at, info);
+
+    if (!done) {
         restore(at);
-    } else {
-        blw_la_copy(at->l1->model->N, at->zeta, at->l1->tau);
+        (void)aim(at, false);
     }
-}
-
-/* tau and l: nothing clipped, or, if that is better, the groups that were under a gross attack in the
- * last solve clipped as they were then. */
-static void start_from_last(const blw_l1_newton_t *at)
-{
-    blw_l1_t *const             self   = at->l1;
-    const blw_l1_model_t *const m      = self->model;
-    const blw_real_t            kalman = blw_la_dot(m->N, at->zeta, self->l);
-    blw_real_t                  sum    = BLW_R(0.0); /* sum_g c_g |nu_g| */
-
-    blw_la_copy(m->N, at->zeta, self->tau);
-    if (self->n_A == 0U) {
-        return;
-    }
-    blw_la_copy(m->N, at->zeta, self->dz);
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        const size_t i = m->first[g];
-        blw_la_axpy(blw_l1_size(m, g), -self->A[g], &self->dir[i], &self->dz[i]);
-        sum += m->c[g] * self->A[g];
-    }
-    blw_la_symv(m->N, m->S, self->dz, self->z);
-    if ((blw_la_dot(m->N, self->dz, self->z) + (BLW_R(2.0) * sum)) < kalman) {
-        blw_la_copy(m->N, self->dz, self->tau);
-        blw_la_copy(m->N, self->z, self->l);
-    }
-}
-
-/* The first point and its sides; kappa such that a gross attack alone is outside. */
-static void start(blw_l1_newton_t *at)
-{
-    blw_l1_t *const             self = at->l1;
-    const blw_l1_model_t *const m    = self->model;
-
-    start_from_last(at);
-    at->kappa = KAPPA_FIRST;
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        const size_t i = m->first[g];
-        self->A[g]     = blw_la_sqrt(m->W[blw_la_packed_row(i) + i]);
-        at->kappa = blw_la_max(at->kappa, (KAPPA_GROSS * blw_l1_norm(m, g, self->l)) / self->A[g]);
-    }
-    (void)aim(at, false);
-    blw_la_gemv(m->n, m->N, m->F, self->tau, at->x);
-}
-
-/* |nu_g| of the groups under a gross attack to A, 0 for the others; dir holds the directions. */
-static void remember(const blw_l1_newton_t *at)
-{
-    blw_l1_t *const             self = at->l1;
-    const blw_l1_model_t *const m    = self->model;
-
-    self->n_A = 0U;
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        blw_real_t       nu[2];
-        const blw_real_t norm  = blw_l1_nu(at, g, nu);
-        const bool       gross = norm > (GROSS * self->A[g]);
-        self->A[g]             = gross ? norm : BLW_R(0.0);
-        self->n_A              = (uint16_t)(self->n_A + (gross ? 1U : 0U));
-    }
+    return done;
 }
 
 static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
@@ -370,7 +321,9 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
     bool                        quiet = true;
 
     at.x = x;
-    start(&at);
+    blw_l1_newton_start(&at);
+    keep(&at);
+    info->converged = try_to_finish(&at, info);
     while (!info->converged && (info->iterations < m->max_iterations) && (at.kappa >= KAPPA_LAST)) {
         const bool settled = descend(&at, info, &quiet);
         const bool last    = (at.kappa * KAPPA_RATIO) < KAPPA_LAST;
@@ -379,21 +332,19 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
             any = true;
         }
         if (last || (settled && quiet)) {
-            info->converged = finish(&at, info);
-            if (!info->converged && any) {
-                restore(&at);
-                (void)aim(&at, false);
-            }
+            info->converged = try_to_finish(&at, info);
         }
-        if (!info->converged) {
+        if (!info->converged && any) {
             tighten(&at);
+        } else if (!info->converged) {
+            loosen(&at);
         }
     }
     if (info->converged) {
-        remember(&at);
+        blw_l1_newton_remember(&at);
     } else {
         self->n_A = 0U;
-        fall_back(&at, any);
+        restore(&at);
     }
 }
 
@@ -416,7 +367,7 @@ static BLW_COLD void lay_out(blw_l1_t *self, blw_real_t *mem)
 static bool fits(const blw_l1_model_t *m)
 {
     return blw_l1_has_pairs(m) && (m->Z == NULL) && (m->S != NULL) && (m->W != NULL)
-           && (m->G != NULL) && (m->P != NULL);
+           && (m->G != NULL) && (m->P != NULL) && (m->M != NULL) && (m->rho > BLW_R(0.0));
 }
 
 const blw_l1_ops_t blw_l1_newton_ops = {

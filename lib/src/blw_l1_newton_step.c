@@ -16,34 +16,9 @@
  * numbers can tell. */
 #define PIVOT2_MIN (BLW_R(16.0) * BLW_REAL_EPS)
 
-/* E' v down to group `last`, for v with its rows `stride` apart.  @return columns of E so far. */
-static size_t gather(const blw_l1_t *self, size_t last, const blw_real_t *v, size_t stride,
-                     blw_real_t *out)
-{
-    const blw_l1_model_t *const m = self->model;
-    size_t                      q = 0U;
-
-    for (size_t g = 0U; g <= last; g++) {
-        const size_t            i       = m->first[g];
-        const blw_real_t *const v_i     = &v[i * stride];
-        const bool              pair    = (blw_l1_size(m, g) == 2U);
-        const bool              outside = blw_l1_outside(self, g, i);
-        if (pair && outside) {
-            out[q] = (self->dir[i] * v_i[stride]) - (self->dir[i + 1U] * v_i[0]);
-            q++;
-        } else if (!outside) {
-            out[q]                    = v_i[0];
-            out[q + (pair ? 1U : 0U)] = v_i[pair ? stride : 0U];
-            q += pair ? 2U : 1U;
-        } else {
-            /* one row outside: l_g is known */
-        }
-    }
-    return q;
-}
-
-/* l or another v [N] from its columns: v = E y on the rows of E, unchanged plus turned on pairs. */
-static void spread(const blw_l1_t *self, const blw_real_t *y, blw_real_t *v)
+/* The columns of E to self->dz: row i of the problem, or, below 0, the pair of rows i and i + 1 turned
+ * by 90 degrees as -1 - i.  Small integers, exact in blw_real_t.  @return their number. */
+static size_t list_columns(blw_l1_t *self)
 {
     const blw_l1_model_t *const m = self->model;
     size_t                      q = 0U;
@@ -52,15 +27,68 @@ static void spread(const blw_l1_t *self, const blw_real_t *y, blw_real_t *v)
         const size_t i    = m->first[g];
         const bool   pair = (blw_l1_size(m, g) == 2U);
         if (!blw_l1_outside(self, g, i)) {
-            v[i] += y[q];
-            v[i + (pair ? 1U : 0U)] += pair ? y[q + 1U] : BLW_R(0.0);
+            self->dz[q]                    = (blw_real_t)i;
+            self->dz[q + (pair ? 1U : 0U)] = (blw_real_t)(i + (pair ? 1U : 0U));
             q += pair ? 2U : 1U;
         } else if (pair) {
-            v[i] -= self->dir[i + 1U] * y[q];
-            v[i + 1U] += self->dir[i] * y[q];
+            self->dz[q] = BLW_R(-1.0) - (blw_real_t)i;
             q++;
         } else {
             /* one row outside: l_g is known */
+        }
+    }
+    return q;
+}
+
+/* Whether column q is a turned pair; its first row, or the row, in *i. */
+static bool turned(const blw_l1_t *self, size_t q, size_t *i)
+{
+    const int32_t at = (int32_t)self->dz[q];
+
+    *i = (size_t)((at < 0) ? (-1 - at) : at);
+    return at < 0;
+}
+
+/* out = E' v for the first `count` columns, v with its rows `stride` apart.  out may be v. */
+static void gather(const blw_l1_t *self, size_t count, const blw_real_t *v, size_t stride,
+                   blw_real_t *out)
+{
+    for (size_t q = 0U; q < count; q++) {
+        size_t                  i;
+        const bool              turn = turned(self, q, &i);
+        const blw_real_t *const v_i  = &v[i * stride];
+        out[q] = turn ? ((self->dir[i] * v_i[stride]) - (self->dir[i + 1U] * v_i[0])) : v_i[0];
+    }
+}
+
+/* The same for the turned sum of the rows of W that belong to the pair at row i. */
+static void gather_turned(const blw_l1_t *self, size_t count, size_t i, blw_real_t *out)
+{
+    const blw_real_t *const A = &self->model->W[blw_la_packed_row(i)];
+    const blw_real_t *const B = &A[i + 1U];
+    const blw_real_t        a = self->dir[i + 1U];
+    const blw_real_t        b = self->dir[i];
+
+    for (size_t q = 0U; q < count; q++) {
+        size_t           j;
+        const bool       turn = turned(self, q, &j);
+        const blw_real_t v    = (b * B[j]) - (a * A[j]);
+        out[q] =
+            turn ? ((self->dir[j] * ((b * B[j + 1U]) - (a * A[j + 1U]))) - (self->dir[j + 1U] * v))
+                 : v;
+    }
+}
+
+/* v += E y. */
+static void spread(const blw_l1_t *self, size_t count, const blw_real_t *y, blw_real_t *v)
+{
+    for (size_t q = 0U; q < count; q++) {
+        size_t i;
+        if (turned(self, q, &i)) {
+            v[i] -= self->dir[i + 1U] * y[q];
+            v[i + 1U] += self->dir[i] * y[q];
+        } else {
+            v[i] += y[q];
         }
     }
 }
@@ -75,50 +103,56 @@ static blw_real_t share(const blw_l1_newton_t *at, size_t g)
                : ((at->kappa * self->A[g]) / self->model->c[g]);
 }
 
+/* Column q of E, the pair at row i turned: row q of the matrix. */
+static void add_turned_row(const blw_l1_newton_t *at, size_t g, size_t i, size_t q)
+{
+    const blw_l1_t *const   self = at->l1;
+    const blw_real_t *const W_i  = &self->model->W[blw_la_packed_row(i)];
+    const blw_real_t *const W_j  = &W_i[i + 1U];
+    const blw_real_t        a    = self->dir[i + 1U];
+    const blw_real_t        b    = self->dir[i];
+    blw_real_t *const       row  = blw_l1_row_of_L(self, q);
+    blw_real_t              nu[2];
+
+    gather_turned(self, q, i, row);
+    row[q] = (b * ((b * W_j[i + 1U]) - (a * W_j[i]))) - (a * ((b * W_j[i]) - (a * W_i[i])));
+    row[q] += blw_l1_nu(at, g, nu) / self->model->c[g];
+}
+
 /* Rows of the matrix for the columns of E of group g, from row r on.  @return their number. */
-static size_t add_rows(blw_l1_newton_t *at, size_t g, size_t r)
+static size_t add_rows(const blw_l1_newton_t *at, size_t g, size_t r)
 {
     const blw_l1_t *const       self = at->l1;
     const blw_l1_model_t *const m    = self->model;
     const size_t                i    = m->first[g];
     const size_t                size = blw_l1_size(m, g);
-    const blw_real_t *const     W_i  = &m->W[blw_la_packed_row(i)];
-    const blw_real_t *const     W_j  = &W_i[i + 1U]; /* row i + 1 */
 
-    if (!blw_l1_outside(self, g, i)) {
-        for (size_t k = 0U; k < size; k++) {
-            blw_real_t *const Lr = blw_l1_row_of_L(self, r + k);
-            (void)gather(self, g, (k == 0U) ? W_i : W_j, 1U, Lr);
-            Lr[r + k] += share(at, g);
+    if (blw_l1_outside(self, g, i)) {
+        if (size == 2U) {
+            add_turned_row(at, g, i, r);
         }
-        return size;
+        return size - 1U;
     }
-    if (size == 2U) {
-        blw_real_t        nu[2];
-        blw_real_t *const row = self->step;
-        for (size_t j = 0U; j <= i; j++) {
-            row[j] = (self->dir[i] * W_j[j]) - (self->dir[i + 1U] * W_i[j]);
-        }
-        row[i + 1U]          = (self->dir[i] * W_j[i + 1U]) - (self->dir[i + 1U] * W_j[i]);
-        blw_real_t *const Lr = blw_l1_row_of_L(self, r);
-        (void)gather(self, g, row, 1U, Lr);
-        Lr[r] += blw_l1_nu(at, g, nu) / m->c[g];
+    for (size_t k = 0U; k < size; k++) {
+        blw_real_t *const row = blw_l1_row_of_L(self, r + k);
+        gather(self, r + k + 1U, &m->W[blw_la_packed_row(i + k)], 1U, row);
+        row[r + k] += share(at, g);
     }
-    return size - 1U;
+    return size;
 }
 
 static void factorise(blw_l1_newton_t *at)
 {
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
+    size_t                      r    = 0U;
 
-    at->free = 0U;
     for (size_t g = 0U; g < m->n_groups; g++) {
-        at->free += add_rows(at, g, at->free);
+        r += add_rows(at, g, r);
     }
     for (size_t k = 0U; k < m->n; k++) {
         blw_real_t *const Lr = blw_l1_row_of_L(self, at->free + k);
-        (void)gather(self, m->n_groups - 1U, &m->G[k], m->n, Lr);
+        gather(self, at->free, &m->G[k], m->n, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[at->free]);
         Lr[at->free + k] = -DAMPING / m->P[blw_la_packed_row(k) + k];
     }
@@ -158,7 +192,7 @@ static void solve_system(blw_l1_newton_t *at, blw_real_t *l)
     blw_l1_t *const self = at->l1;
 
     blw_l1_solve_LJL(self, at->free, at->free + self->model->n);
-    spread(self, self->step, l);
+    spread(self, at->free, self->step, l);
     blw_la_copy(self->model->n, &self->step[at->free], self->step);
 }
 
@@ -203,10 +237,11 @@ void blw_l1_newton_step(blw_l1_newton_t *at)
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
 
+    at->free = list_columns(self);
     factorise(at);
     take_known(self, self->z);
-    residual(at, self->z, self->dz);
-    (void)gather(self, m->n_groups - 1U, self->dz, 1U, self->step);
+    residual(at, self->z, self->step);
+    gather(self, at->free, self->step, 1U, self->step);
     blw_l1_imbalance(m, self->z, &self->step[at->free]);
     solve_system(at, self->z);
     blw_la_axpy(m->n, BLW_R(1.0), self->step, at->x);

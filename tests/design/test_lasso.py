@@ -140,7 +140,22 @@ def test_design_given_auto_takes_the_active_set_with_its_bound(name, engine, bou
     fused = designed.tables.to_json()["l1"]
     assert fused["engine"] == engine
     assert fused["max_iterations"] == designed.info["max_iterations"] == bound
-    assert fused["M"] is None and fused["rho"] == 0.0
+    assert (fused["M"] is None) == (fused["rho"] == 0.0) == (engine == l1.TABLEAU.name)
+
+
+def test_smoothed_given_zeta_solves_the_conditions_with_every_group_inside():
+    *_, designed = design("complex", gamma=1.0)
+    fused = designed.tables.to_json()["l1"]
+    N, n = fused["N"], fused["n"]
+    M, W = symmetric(fused["M"], N), symmetric(fused["W"], N)
+    G, first = np.array(fused["G"]).reshape(N, n), np.array(fused["first"])
+    D = fused["rho"] * np.sqrt(np.diag(W)[first[:-1]]) / np.array(fused["c"])
+    zeta = np.random.default_rng(1).standard_normal(N) * np.sqrt(np.diag(W))
+    multipliers = M @ zeta
+    rest = zeta - W @ multipliers - np.repeat(D, np.diff(first)) * multipliers
+    x = np.linalg.lstsq(G, rest, rcond=None)[0]
+    assert rest == pytest.approx(G @ x, abs=1e-7 * np.linalg.norm(zeta))
+    assert np.abs(G.T @ multipliers).max() < 1e-9 * (np.abs(G.T) @ np.abs(multipliers)).max()
 
 
 @pytest.mark.parametrize("name, pivots", [("paper0", 4), ("complex", 8)])

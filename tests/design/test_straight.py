@@ -95,8 +95,8 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     text = text.replace(f"BLW_{name.upper()}_{method}_", f"BLW_{name.upper()}_{method.upper()}_")
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
-               "l1_factor", "l1_kkt", "l1_newton", "l1_newton_step", "l1_refine", "l1_support",
-               "l1_tableau"]
+               "l1_factor", "l1_kkt", "l1_newton", "l1_newton_start", "l1_newton_step", "l1_refine",
+               "l1_support", "l1_tableau"]
     library = ROOT / "lib" / "src"
     sources = [*(library / f"blw_{module}.c" for module in modules), *library.glob("blw_guard*.c")]
     subprocess.run(["gcc", "-std=c99", "-O1", "-ffp-contract=off", *WIDTHS[width],

@@ -134,7 +134,7 @@ public:
         m.Z              = Z_table_.data();
         m.F              = F_table_.data();
         m.c              = c_table_.data();
-        m.M              = (engine == &blw_l1_admm_ops) ? M_table_.data() : nullptr;
+        m.M              = M_of(engine);
         if ((engine == &blw_l1_tableau_ops) || (engine == &blw_l1_newton_ops)) {
             m.Z = nullptr;
             m.S = S_table_.data();
@@ -142,7 +142,7 @@ public:
             m.G = G_table_.data();
             m.P = P_table_.data();
         }
-        m.rho     = (engine == &blw_l1_admm_ops) ? BLW_R(0.3) : BLW_R(0.0);
+        m.rho     = (m.M != nullptr) ? BLW_R(0.3) : BLW_R(0.0);
         m.kappa_G = static_cast<blw_real_t>(kappa_G_);
         m.kappa_W = static_cast<blw_real_t>(kappa_W_);
         return m;
@@ -162,6 +162,27 @@ public:
     }
 
 private:
+    const blw_real_t *M_of(const blw_l1_ops_t *engine) const
+    {
+        if (engine == &blw_l1_newton_ops) {
+            return smoothed_table_.data();
+        }
+        return (engine == &blw_l1_admm_ops) ? M_table_.data() : nullptr;
+    }
+
+    // From zeta to l where nu_g = D l_g for all groups: see blw_l1_newton_start.c.
+    Matrix smoothed() const
+    {
+        Matrix K = W_;
+        for (Eigen::Index g = 0; g < c_.size(); ++g) {
+            const double width = std::sqrt(W_(first(g), first(g)));
+            K.diagonal().segment(first(g), size(g)).array() += 0.3 * width / c_(g);
+        }
+        K               = K.inverse().eval();
+        const Matrix KG = K * G_;
+        return K - KG * (G_.transpose() * KG).inverse() * KG.transpose();
+    }
+
     Eigen::Index first(Eigen::Index g) const
     {
         return first_[static_cast<size_t>(g)];
@@ -234,9 +255,10 @@ private:
                 G_table_.push_back(static_cast<blw_real_t>(G_(i, j)));
             }
         }
-        S_table_ = lower(Z_ * Z_.transpose());
-        W_table_ = lower(W_);
-        P_table_ = lower(F_ * W_ * F_.transpose());
+        S_table_        = lower(Z_ * Z_.transpose());
+        smoothed_table_ = lower(smoothed());
+        W_table_        = lower(W_);
+        P_table_        = lower(F_ * W_ * F_.transpose());
         Vector rows_c(N_);
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             c_table_.push_back(static_cast<blw_real_t>(c_(g)));
@@ -257,7 +279,7 @@ private:
     std::vector<uint16_t>   first_;
     Matrix                  G_, W_, Z_, F_;
     std::vector<blw_real_t> Z_table_, F_table_, c_table_, M_table_;
-    std::vector<blw_real_t> S_table_, W_table_, G_table_, P_table_;
+    std::vector<blw_real_t> S_table_, W_table_, G_table_, P_table_, smoothed_table_;
     double                  kappa_G_ = 0.0;
     double                  kappa_W_ = 0.0;
 };

@@ -22,7 +22,7 @@ static const blw_real_t attacked[N] = {BLW_R(0.0), BLW_R(0.0),  BLW_R(4.0),  BLW
                                        BLW_R(5.0), BLW_R(60.0), BLW_R(80.0), BLW_R(90.0)};
 static const double     expected[STATES] = {0.3, 0.4, 5.0};
 
-static blw_real_t     S[PACKED], W[PACKED], G[N * STATES], F[STATES * N], P[6];
+static blw_real_t     S[PACKED], M[PACKED], W[PACKED], G[N * STATES], F[STATES * N], P[6];
 static blw_l1_model_t model;
 static blw_l1_t       l1;
 static blw_real_t     mem[BLW_L1_MEM(N, N - STATES, GROUPS)];
@@ -37,6 +37,7 @@ void setUp(void)
             const double shared = ((i % STATES) == (j % STATES)) ? (1.0 / 3.0) : 0.0;
             W[at]               = (i == j) ? BLW_R(1.0) : BLW_R(0.0);
             S[at]               = (blw_real_t)((double)W[at] - shared);
+            M[at]               = S[at] / BLW_R(1.2); /* W + D = 1.2 I */
         }
         for (size_t k = 0U; k < (size_t)STATES; k++) {
             G[(i * STATES) + k] = ((i % STATES) == k) ? BLW_R(1.0) : BLW_R(0.0);
@@ -55,10 +56,12 @@ void setUp(void)
                              .first          = first,
                              .F              = F,
                              .c              = ones,
+                             .M              = M,
                              .S              = S,
                              .W              = W,
                              .G              = G,
                              .P              = P,
+                             .rho            = BLW_R(0.2),
                              .kappa_G        = BLW_R(0.33333333),
                              .kappa_W        = BLW_R(2.5)};
     blw_l1_init(&l1, &model, mem);
@@ -214,7 +217,7 @@ static blw_status_t check(void)
 
 static void test_check_given_a_missing_table_refuses(void)
 {
-    const blw_real_t **const tables[] = {&model.S, &model.W, &model.G, &model.P};
+    const blw_real_t **const tables[] = {&model.M, &model.S, &model.W, &model.G, &model.P};
 
     TEST_ASSERT_EQUAL_INT(BLW_OK, check());
     for (size_t k = 0U; k < (sizeof tables / sizeof tables[0]); k++) {
@@ -223,7 +226,10 @@ static void test_check_given_a_missing_table_refuses(void)
         TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, check());
         *tables[k] = kept;
     }
-    model.Z = S;
+    model.rho = BLW_R(0.0);
+    TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, check());
+    model.rho = BLW_R(0.2);
+    model.Z   = S;
     TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, check());
 }
 

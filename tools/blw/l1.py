@@ -229,7 +229,18 @@ class Engine:
     link: Link
     max_iterations: int
     rho: float = 0.0
-    M: Array | None = None  #: (S + rho I)^-1
+    M: Array | None = None  #: admm: (S + rho I)^-1; newton: smoothed()
+
+
+def smoothed(reduced_form: Reduced, groups: Groups, c: Array, kappa: float) -> Array:
+    """[N x N] from zeta to the multipliers l where the corner of every |nu_g| is rounded off below
+    kappa width_g and no nu_g is beyond, blw_l1_newton_start.c (1): S with W + D in place of W,
+    D = kappa width_g / c_g on group g, width_g = the benign standard deviation of its first row."""
+    width = np.sqrt(np.diag(reduced_form.W)[groups.first[:-1]])
+    K = np.linalg.inv(reduced_form.W + np.diag(groups.spread(kappa * width / c)))
+    KH = K @ reduced_form.H
+    M = K - KH @ np.linalg.solve(reduced_form.H.T @ KH, KH.T)
+    return (M + M.T) / 2.0
 
 
 def struct(
@@ -244,7 +255,8 @@ def struct(
     in_W = tableau or engine.link is NEWTON
     packed = "[N(N+1)/2] packed lower"
     scaled_F = F / reduced_form.scale
-    M = None if engine.M is None else table(pack_lower(engine.M), "[N(N+1)/2] (S + rho I)^-1")
+    inverse = "S smoothed by rho" if in_W else "(S + rho I)^-1"
+    M = None if engine.M is None else table(pack_lower(engine.M), f"{packed}: {inverse}")
     return Struct(
         "blw_l1_model_t",
         suffix,

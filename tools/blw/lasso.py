@@ -32,8 +32,10 @@ GAMMA_KEYS = ("gamma", "recovery_probability", "benign_loss")
 #: Mean square error without attack above that of the Kalman filter, as a part of it.
 DEFAULT_BENIGN_LOSS = 0.1
 
-#: Bound on the Newton steps of one solve: those that converge need about 20, whatever the model.
+#: Bound on the Newton steps of one solve: those that converge need about 6.
 NEWTON_STEPS = 64
+#: Smoothing of the passes before them, in benign standard deviations of zeta.
+NEWTON_KAPPA = 0.2
 #: They and the tableau work with W: above this cond(W) float32 is better served by pivots on Z.
 COND_COARSE = 1e10
 
@@ -186,7 +188,11 @@ def choose_active_set(problem: admm_tuning.Problem, canonical: bool, cond_W: flo
     paired = problem.groups.count < N
     if cond_W > COND_COARSE or (paired and canonical):
         return l1.Engine(l1.ACTIVE_SET, (PIVOTS_IF_PAIRED if paired else PIVOTS) * N)
-    return l1.Engine(l1.NEWTON, NEWTON_STEPS) if paired else l1.Engine(l1.TABLEAU, PIVOTS * N)
+    if not paired:
+        return l1.Engine(l1.TABLEAU, PIVOTS * N)
+    c = l1.thresholds(problem.reduced, problem.groups, problem.gamma)
+    M = l1.smoothed(problem.reduced, problem.groups, c, NEWTON_KAPPA)
+    return l1.Engine(l1.NEWTON, NEWTON_STEPS, NEWTON_KAPPA, M)
 
 
 def choose_engine(
