@@ -18,6 +18,17 @@ public:
     }
 };
 
+const blw_guard_solver_t *solver(const JsonNode &name)
+{
+    if (name.text() == "one") {
+        return &blw_guard_one_ops;
+    }
+    if (name.text() != "many") {
+        name.fail("unknown solver '" + name.text() + "'");
+    }
+    return &blw_guard_many_ops;
+}
+
 /* The small members, from which the lengths of the tables follow. */
 void load_sizes(TableReader &tables, const blw_plant_t &plant, blw_guard_model_t &model)
 {
@@ -30,6 +41,7 @@ void load_sizes(TableReader &tables, const blw_plant_t &plant, blw_guard_model_t
     model.pairs       = tables.integer<std::uint8_t>("pairs");
     model.max_updates = tables.integer<std::uint16_t>("max_updates");
     model.warm_up     = tables.integer<std::uint16_t>("warm_up");
+    model.solver      = solver(tables.member("solver"));
     model.unit        = tables.indices("unit", plant.m);
     model.rank        = tables.indices("rank", plant.m);
     if ((model.n_u > plant.n) || (model.reach < 1U) || (model.reach > model.r)) {

@@ -498,102 +498,156 @@ static const blw_real_t canonical_l1_P[10] = {
 static void canonical_l1_fast_symv(const blw_real_t *S, const blw_real_t *x, blw_real_t *y)
 {
     const blw_real_t x0 = x[0];
+    blw_real_t y0 = (S[0] * x0);
+    y[0] = y0;
     const blw_real_t x1 = x[1];
+    blw_real_t y1 = (S[1] * x0) + (S[2] * x1);
+    y0 += S[1] * x1;
+    y[1] = y1;
     const blw_real_t x2 = x[2];
-    const blw_real_t x3 = x[3];
-    const blw_real_t x4 = x[4];
-    const blw_real_t x5 = x[5];
-    const blw_real_t x6 = x[6];
-    const blw_real_t x7 = x[7];
-    const blw_real_t x8 = x[8];
-    const blw_real_t x9 = x[9];
-    const blw_real_t x10 = x[10];
-    const blw_real_t x11 = x[11];
-    const blw_real_t x12 = x[12];
-    const blw_real_t x13 = x[13];
-    const blw_real_t x14 = x[14];
-    const blw_real_t x15 = x[15];
-    blw_real_t y0 = (S[0] * x0) + (S[1] * x1) + (S[3] * x2);
-    blw_real_t y1 = (S[1] * x0) + (S[2] * x1) + (S[4] * x2);
     blw_real_t y2 = (S[3] * x0) + (S[4] * x1) + (S[5] * x2);
-    blw_real_t y3 = (S[6] * x0) + (S[7] * x1) + (S[8] * x2) + (S[9] * x3) + (S[13] * x4) + (S[18] *
-        x5);
-    blw_real_t y4 = (S[10] * x0) + (S[11] * x1) + (S[12] * x2) + (S[13] * x3) + (S[14] * x4) +
-        (S[19] * x5);
+    y0 += S[3] * x2;
+    y1 += S[4] * x2;
+    y[2] = y2;
+    const blw_real_t x3 = x[3];
+    blw_real_t y3 = (S[6] * x0) + (S[7] * x1) + (S[8] * x2) + (S[9] * x3);
+    y0 += S[6] * x3;
+    y1 += S[7] * x3;
+    y2 += S[8] * x3;
+    y[3] = y3;
+    const blw_real_t x4 = x[4];
+    blw_real_t y4 = (S[10] * x0) + (S[11] * x1) + (S[12] * x2) + (S[13] * x3) + (S[14] * x4);
+    y0 += S[10] * x4;
+    y1 += S[11] * x4;
+    y2 += S[12] * x4;
+    y3 += S[13] * x4;
+    y[4] = y4;
+    const blw_real_t x5 = x[5];
     blw_real_t y5 = (S[15] * x0) + (S[16] * x1) + (S[17] * x2) + (S[18] * x3) + (S[19] * x4) +
         (S[20] * x5);
-    y0 = y0 + (S[6] * x3) + (S[10] * x4) + (S[15] * x5);
-    y1 = y1 + (S[7] * x3) + (S[11] * x4) + (S[16] * x5);
-    y2 = y2 + (S[8] * x3) + (S[12] * x4) + (S[17] * x5);
+    y0 += S[15] * x5;
+    y1 += S[16] * x5;
+    y2 += S[17] * x5;
+    y3 += S[18] * x5;
+    y4 += S[19] * x5;
+    y[5] = y5;
+    const blw_real_t x6 = x[6];
     blw_real_t y6 = (S[21] * x0) + (S[22] * x1) + (S[23] * x2) + (S[24] * x3) + (S[25] * x4) +
-        (S[26] * x5) + (S[27] * x6) + (S[34] * x7) + (S[42] * x8);
+        (S[26] * x5) + (S[27] * x6);
+    y0 += S[21] * x6;
+    y1 += S[22] * x6;
+    y2 += S[23] * x6;
+    y3 += S[24] * x6;
+    y4 += S[25] * x6;
+    y5 += S[26] * x6;
+    y[6] = y6;
+    const blw_real_t x7 = x[7];
     blw_real_t y7 = (S[28] * x0) + (S[29] * x1) + (S[30] * x2) + (S[31] * x3) + (S[32] * x4) +
-        (S[33] * x5) + (S[34] * x6) + (S[35] * x7) + (S[43] * x8);
-    blw_real_t y8 = (S[36] * x0) + (S[37] * x1) + (S[38] * x2) + (S[39] * x3) + (S[40] * x4) +
-        (S[41] * x5) + (S[42] * x6) + (S[43] * x7) + (S[44] * x8);
-    y0 = y0 + (S[21] * x6) + (S[28] * x7) + (S[36] * x8);
-    y1 = y1 + (S[22] * x6) + (S[29] * x7) + (S[37] * x8);
-    y2 = y2 + (S[23] * x6) + (S[30] * x7) + (S[38] * x8);
-    y3 = y3 + (S[24] * x6) + (S[31] * x7) + (S[39] * x8);
-    y4 = y4 + (S[25] * x6) + (S[32] * x7) + (S[40] * x8);
-    y5 = y5 + (S[26] * x6) + (S[33] * x7) + (S[41] * x8);
-    blw_real_t y9 = (S[45] * x0) + (S[46] * x1) + (S[47] * x2) + (S[48] * x3) + (S[49] * x4) +
-        (S[50] * x5) + (S[51] * x6) + (S[52] * x7) + (S[53] * x8) + (S[54] * x9) + (S[64] * x10) +
-        (S[75] * x11);
-    blw_real_t y10 = (S[55] * x0) + (S[56] * x1) + (S[57] * x2) + (S[58] * x3) + (S[59] * x4) +
-        (S[60] * x5) + (S[61] * x6) + (S[62] * x7) + (S[63] * x8) + (S[64] * x9) + (S[65] * x10) +
-        (S[76] * x11);
-    blw_real_t y11 = (S[66] * x0) + (S[67] * x1) + (S[68] * x2) + (S[69] * x3) + (S[70] * x4) +
-        (S[71] * x5) + (S[72] * x6) + (S[73] * x7) + (S[74] * x8) + (S[75] * x9) + (S[76] * x10) +
-        (S[77] * x11);
-    y0 = y0 + (S[45] * x9) + (S[55] * x10) + (S[66] * x11);
-    y1 = y1 + (S[46] * x9) + (S[56] * x10) + (S[67] * x11);
-    y2 = y2 + (S[47] * x9) + (S[57] * x10) + (S[68] * x11);
-    y3 = y3 + (S[48] * x9) + (S[58] * x10) + (S[69] * x11);
-    y4 = y4 + (S[49] * x9) + (S[59] * x10) + (S[70] * x11);
-    y5 = y5 + (S[50] * x9) + (S[60] * x10) + (S[71] * x11);
-    y6 = y6 + (S[51] * x9) + (S[61] * x10) + (S[72] * x11);
-    y7 = y7 + (S[52] * x9) + (S[62] * x10) + (S[73] * x11);
-    y8 = y8 + (S[53] * x9) + (S[63] * x10) + (S[74] * x11);
-    blw_real_t y12 = (S[78] * x0) + (S[79] * x1) + (S[80] * x2) + (S[81] * x3) + (S[82] * x4) +
-        (S[83] * x5) + (S[84] * x6) + (S[85] * x7) + (S[86] * x8) + (S[87] * x9) + (S[88] * x10) +
-        (S[89] * x11) + (S[90] * x12) + (S[103] * x13) + (S[117] * x14);
-    blw_real_t y13 = (S[91] * x0) + (S[92] * x1) + (S[93] * x2) + (S[94] * x3) + (S[95] * x4) +
-        (S[96] * x5) + (S[97] * x6) + (S[98] * x7) + (S[99] * x8) + (S[100] * x9) + (S[101] * x10) +
-        (S[102] * x11) + (S[103] * x12) + (S[104] * x13) + (S[118] * x14);
-    blw_real_t y14 = (S[105] * x0) + (S[106] * x1) + (S[107] * x2) + (S[108] * x3) + (S[109] * x4) +
-        (S[110] * x5) + (S[111] * x6) + (S[112] * x7) + (S[113] * x8) + (S[114] * x9) + (S[115] *
-        x10) + (S[116] * x11) + (S[117] * x12) + (S[118] * x13) + (S[119] * x14);
-    y0 = y0 + (S[78] * x12) + (S[91] * x13) + (S[105] * x14);
-    y1 = y1 + (S[79] * x12) + (S[92] * x13) + (S[106] * x14);
-    y2 = y2 + (S[80] * x12) + (S[93] * x13) + (S[107] * x14);
-    y3 = y3 + (S[81] * x12) + (S[94] * x13) + (S[108] * x14);
-    y4 = y4 + (S[82] * x12) + (S[95] * x13) + (S[109] * x14);
-    y5 = y5 + (S[83] * x12) + (S[96] * x13) + (S[110] * x14);
-    y6 = y6 + (S[84] * x12) + (S[97] * x13) + (S[111] * x14);
-    y7 = y7 + (S[85] * x12) + (S[98] * x13) + (S[112] * x14);
-    y8 = y8 + (S[86] * x12) + (S[99] * x13) + (S[113] * x14);
-    y9 = y9 + (S[87] * x12) + (S[100] * x13) + (S[114] * x14);
-    y10 = y10 + (S[88] * x12) + (S[101] * x13) + (S[115] * x14);
-    y11 = y11 + (S[89] * x12) + (S[102] * x13) + (S[116] * x14);
-    blw_real_t y15 = (S[120] * x0) + (S[121] * x1) + (S[122] * x2) + (S[123] * x3) + (S[124] * x4) +
-        (S[125] * x5) + (S[126] * x6) + (S[127] * x7) + (S[128] * x8) + (S[129] * x9) + (S[130] *
-        x10) + (S[131] * x11) + (S[132] * x12) + (S[133] * x13) + (S[134] * x14) + (S[135] * x15);
-    y0 = y0 + (S[120] * x15);
-    y1 = y1 + (S[121] * x15);
-    y2 = y2 + (S[122] * x15);
-    y3 = y3 + (S[123] * x15);
-    y4 = y4 + (S[124] * x15);
-    y5 = y5 + (S[125] * x15);
-    y6 = y6 + (S[126] * x15);
-    y7 = y7 + (S[127] * x15);
-    y8 = y8 + (S[128] * x15);
-    y9 = y9 + (S[129] * x15);
-    y10 = y10 + (S[130] * x15);
-    y11 = y11 + (S[131] * x15);
-    y12 = y12 + (S[132] * x15);
-    y13 = y13 + (S[133] * x15);
-    y14 = y14 + (S[134] * x15);
+        (S[33] * x5) + (S[34] * x6) + (S[35] * x7);
+    y0 += S[28] * x7;
+    y1 += S[29] * x7;
+    y2 += S[30] * x7;
+    y3 += S[31] * x7;
+    y4 += S[32] * x7;
+    y5 += S[33] * x7;
+    y6 += S[34] * x7;
+    y[7] = y7;
+    const blw_real_t x8 = x[8];
+    const blw_real_t y8 = (S[36] * x0) + (S[37] * x1) + (S[38] * x2) + (S[39] * x3) + (S[40] * x4) +
+        (S[41] * x5) + (S[42] * x6) + (S[43] * x7);
+    y0 += S[36] * x8;
+    y1 += S[37] * x8;
+    y2 += S[38] * x8;
+    y3 += S[39] * x8;
+    y4 += S[40] * x8;
+    y5 += S[41] * x8;
+    y6 += S[42] * x8;
+    y7 += S[43] * x8;
+    y[8] = y8;
+    const blw_real_t x9 = x[9];
+    const blw_real_t y9 = (S[45] * x0) + (S[46] * x1) + (S[47] * x2) + (S[48] * x3) + (S[49] * x4) +
+        (S[50] * x5) + (S[51] * x6) + (S[52] * x7);
+    y0 += S[45] * x9;
+    y1 += S[46] * x9;
+    y2 += S[47] * x9;
+    y3 += S[48] * x9;
+    y4 += S[49] * x9;
+    y5 += S[50] * x9;
+    y6 += S[51] * x9;
+    y7 += S[52] * x9;
+    y[9] = y9;
+    const blw_real_t x10 = x[10];
+    const blw_real_t y10 = (S[55] * x0) + (S[56] * x1) + (S[57] * x2) + (S[58] * x3) + (S[59] * x4)
+        + (S[60] * x5) + (S[61] * x6) + (S[62] * x7);
+    y0 += S[55] * x10;
+    y1 += S[56] * x10;
+    y2 += S[57] * x10;
+    y3 += S[58] * x10;
+    y4 += S[59] * x10;
+    y5 += S[60] * x10;
+    y6 += S[61] * x10;
+    y7 += S[62] * x10;
+    y[10] = y10;
+    const blw_real_t x11 = x[11];
+    const blw_real_t y11 = (S[66] * x0) + (S[67] * x1) + (S[68] * x2) + (S[69] * x3) + (S[70] * x4)
+        + (S[71] * x5) + (S[72] * x6) + (S[73] * x7);
+    y0 += S[66] * x11;
+    y1 += S[67] * x11;
+    y2 += S[68] * x11;
+    y3 += S[69] * x11;
+    y4 += S[70] * x11;
+    y5 += S[71] * x11;
+    y6 += S[72] * x11;
+    y7 += S[73] * x11;
+    y[11] = y11;
+    const blw_real_t x12 = x[12];
+    const blw_real_t y12 = (S[78] * x0) + (S[79] * x1) + (S[80] * x2) + (S[81] * x3) + (S[82] * x4)
+        + (S[83] * x5) + (S[84] * x6) + (S[85] * x7);
+    y0 += S[78] * x12;
+    y1 += S[79] * x12;
+    y2 += S[80] * x12;
+    y3 += S[81] * x12;
+    y4 += S[82] * x12;
+    y5 += S[83] * x12;
+    y6 += S[84] * x12;
+    y7 += S[85] * x12;
+    y[12] = y12;
+    const blw_real_t x13 = x[13];
+    const blw_real_t y13 = (S[91] * x0) + (S[92] * x1) + (S[93] * x2) + (S[94] * x3) + (S[95] * x4)
+        + (S[96] * x5) + (S[97] * x6) + (S[98] * x7);
+    y0 += S[91] * x13;
+    y1 += S[92] * x13;
+    y2 += S[93] * x13;
+    y3 += S[94] * x13;
+    y4 += S[95] * x13;
+    y5 += S[96] * x13;
+    y6 += S[97] * x13;
+    y7 += S[98] * x13;
+    y[13] = y13;
+    const blw_real_t x14 = x[14];
+    const blw_real_t y14 = (S[105] * x0) + (S[106] * x1) + (S[107] * x2) + (S[108] * x3) + (S[109] *
+        x4) + (S[110] * x5) + (S[111] * x6) + (S[112] * x7);
+    y0 += S[105] * x14;
+    y1 += S[106] * x14;
+    y2 += S[107] * x14;
+    y3 += S[108] * x14;
+    y4 += S[109] * x14;
+    y5 += S[110] * x14;
+    y6 += S[111] * x14;
+    y7 += S[112] * x14;
+    y[14] = y14;
+    const blw_real_t x15 = x[15];
+    const blw_real_t y15 = (S[120] * x0) + (S[121] * x1) + (S[122] * x2) + (S[123] * x3) + (S[124] *
+        x4) + (S[125] * x5) + (S[126] * x6) + (S[127] * x7);
+    y0 += S[120] * x15;
+    y1 += S[121] * x15;
+    y2 += S[122] * x15;
+    y3 += S[123] * x15;
+    y4 += S[124] * x15;
+    y5 += S[125] * x15;
+    y6 += S[126] * x15;
+    y7 += S[127] * x15;
+    y[15] = y15;
     y[0] = y0;
     y[1] = y1;
     y[2] = y2;
@@ -602,14 +656,69 @@ static void canonical_l1_fast_symv(const blw_real_t *S, const blw_real_t *x, blw
     y[5] = y5;
     y[6] = y6;
     y[7] = y7;
-    y[8] = y8;
-    y[9] = y9;
-    y[10] = y10;
-    y[11] = y11;
-    y[12] = y12;
-    y[13] = y13;
-    y[14] = y14;
-    y[15] = y15;
+    const blw_real_t u8 = x[8];
+    blw_real_t v8 = y[8] + (S[44] * u8);
+    y[8] = v8;
+    const blw_real_t u9 = x[9];
+    blw_real_t v9 = y[9] + (S[53] * u8) + (S[54] * u9);
+    v8 += S[53] * u9;
+    y[9] = v9;
+    const blw_real_t u10 = x[10];
+    blw_real_t v10 = y[10] + (S[63] * u8) + (S[64] * u9) + (S[65] * u10);
+    v8 += S[63] * u10;
+    v9 += S[64] * u10;
+    y[10] = v10;
+    const blw_real_t u11 = x[11];
+    blw_real_t v11 = y[11] + (S[74] * u8) + (S[75] * u9) + (S[76] * u10) + (S[77] * u11);
+    v8 += S[74] * u11;
+    v9 += S[75] * u11;
+    v10 += S[76] * u11;
+    y[11] = v11;
+    const blw_real_t u12 = x[12];
+    blw_real_t v12 = y[12] + (S[86] * u8) + (S[87] * u9) + (S[88] * u10) + (S[89] * u11) + (S[90] *
+        u12);
+    v8 += S[86] * u12;
+    v9 += S[87] * u12;
+    v10 += S[88] * u12;
+    v11 += S[89] * u12;
+    y[12] = v12;
+    const blw_real_t u13 = x[13];
+    blw_real_t v13 = y[13] + (S[99] * u8) + (S[100] * u9) + (S[101] * u10) + (S[102] * u11) +
+        (S[103] * u12) + (S[104] * u13);
+    v8 += S[99] * u13;
+    v9 += S[100] * u13;
+    v10 += S[101] * u13;
+    v11 += S[102] * u13;
+    v12 += S[103] * u13;
+    y[13] = v13;
+    const blw_real_t u14 = x[14];
+    blw_real_t v14 = y[14] + (S[113] * u8) + (S[114] * u9) + (S[115] * u10) + (S[116] * u11) +
+        (S[117] * u12) + (S[118] * u13) + (S[119] * u14);
+    v8 += S[113] * u14;
+    v9 += S[114] * u14;
+    v10 += S[115] * u14;
+    v11 += S[116] * u14;
+    v12 += S[117] * u14;
+    v13 += S[118] * u14;
+    y[14] = v14;
+    const blw_real_t u15 = x[15];
+    blw_real_t v15 = y[15] + (S[128] * u8) + (S[129] * u9) + (S[130] * u10) + (S[131] * u11) +
+        (S[132] * u12) + (S[133] * u13) + (S[134] * u14) + (S[135] * u15);
+    v8 += S[128] * u15;
+    v9 += S[129] * u15;
+    v10 += S[130] * u15;
+    v11 += S[131] * u15;
+    v12 += S[132] * u15;
+    v13 += S[133] * u15;
+    v14 += S[134] * u15;
+    y[15] = v15;
+    y[8] = v8;
+    y[9] = v9;
+    y[10] = v10;
+    y[11] = v11;
+    y[12] = v12;
+    y[13] = v13;
+    y[14] = v14;
 }
 
 /* column k of T */
@@ -721,106 +830,16 @@ static void canonical_l1_fast_column(size_t k, const blw_real_t *T, blw_real_t *
     }
 }
 
-/* z = l - t col */
-static bool canonical_l1_fast_advance(const struct blw_l1 *self, blw_real_t t)
-{
-    const blw_real_t *const l = self->l;
-    const blw_real_t *const dir = self->dir;
-    const blw_real_t *const col = self->step;
-    blw_real_t *const z = self->z;
-
-    const blw_real_t v0 = l[0] - (t * col[0]);
-    z[0] = v0;
-    if ((v0 * dir[0]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v1 = l[1] - (t * col[1]);
-    z[1] = v1;
-    if ((v1 * dir[1]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v2 = l[2] - (t * col[2]);
-    z[2] = v2;
-    if ((v2 * dir[2]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v3 = l[3] - (t * col[3]);
-    z[3] = v3;
-    if ((v3 * dir[3]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v4 = l[4] - (t * col[4]);
-    z[4] = v4;
-    if ((v4 * dir[4]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v5 = l[5] - (t * col[5]);
-    z[5] = v5;
-    if ((v5 * dir[5]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v6 = l[6] - (t * col[6]);
-    z[6] = v6;
-    if ((v6 * dir[6]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v7 = l[7] - (t * col[7]);
-    z[7] = v7;
-    if ((v7 * dir[7]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v8 = l[8] - (t * col[8]);
-    z[8] = v8;
-    if ((v8 * dir[8]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v9 = l[9] - (t * col[9]);
-    z[9] = v9;
-    if ((v9 * dir[9]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v10 = l[10] - (t * col[10]);
-    z[10] = v10;
-    if ((v10 * dir[10]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v11 = l[11] - (t * col[11]);
-    z[11] = v11;
-    if ((v11 * dir[11]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v12 = l[12] - (t * col[12]);
-    z[12] = v12;
-    if ((v12 * dir[12]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v13 = l[13] - (t * col[13]);
-    z[13] = v13;
-    if ((v13 * dir[13]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v14 = l[14] - (t * col[14]);
-    z[14] = v14;
-    if ((v14 * dir[14]) < BLW_R(0.0)) {
-        return false;
-    }
-    const blw_real_t v15 = l[15] - (t * col[15]);
-    z[15] = v15;
-    if ((v15 * dir[15]) < BLW_R(0.0)) {
-        return false;
-    }
-    return true;
-}
-
-/* T swept on row k and surveyed: 136 multiply-adds */
+/* T swept on row k, l -= t col, surveyed: 152 multiply-adds */
 static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_real_t share,
-    blw_l1_survey_t *seen)
+    blw_real_t t, blw_l1_survey_t *seen)
 {
     const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;
     const blw_real_t *const col = self->step;
     const blw_real_t *const S = self->T;
-    const blw_real_t *const l = self->l;
-    const blw_real_t *const limit = self->tau;
+    const blw_real_t *const low = self->tau;
+    const blw_real_t *const high = self->z;
+    blw_real_t *const l = self->l;
     blw_real_t *const T = self->L;
     blw_real_t *const row = &T[(k * (k + 1U)) / 2U];
     blw_real_t *const below = &T[k];
@@ -845,25 +864,33 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     const blw_real_t a0 = x0 * share;
     const blw_real_t d0 = S[0] - (a0 * x0);
     T[0] = d0;
-    blw_l1_look(&found, 0U, l[0], limit[0], d0);
+    const blw_real_t v0 = l[0] - (t * x0);
+    l[0] = v0;
+    blw_l1_look(&found, 0U, v0, low[0], high[0], d0);
     const blw_real_t a1 = x1 * share;
     T[1] = S[1] - (a1 * x0);
     const blw_real_t d1 = S[2] - (a1 * x1);
     T[2] = d1;
-    blw_l1_look(&found, 1U, l[1], limit[1], d1);
+    const blw_real_t v1 = l[1] - (t * x1);
+    l[1] = v1;
+    blw_l1_look(&found, 1U, v1, low[1], high[1], d1);
     const blw_real_t a2 = x2 * share;
     T[3] = S[3] - (a2 * x0);
     T[4] = S[4] - (a2 * x1);
     const blw_real_t d2 = S[5] - (a2 * x2);
     T[5] = d2;
-    blw_l1_look(&found, 2U, l[2], limit[2], d2);
+    const blw_real_t v2 = l[2] - (t * x2);
+    l[2] = v2;
+    blw_l1_look(&found, 2U, v2, low[2], high[2], d2);
     const blw_real_t a3 = x3 * share;
     T[6] = S[6] - (a3 * x0);
     T[7] = S[7] - (a3 * x1);
     T[8] = S[8] - (a3 * x2);
     const blw_real_t d3 = S[9] - (a3 * x3);
     T[9] = d3;
-    blw_l1_look(&found, 3U, l[3], limit[3], d3);
+    const blw_real_t v3 = l[3] - (t * x3);
+    l[3] = v3;
+    blw_l1_look(&found, 3U, v3, low[3], high[3], d3);
     const blw_real_t a4 = x4 * share;
     T[10] = S[10] - (a4 * x0);
     T[11] = S[11] - (a4 * x1);
@@ -871,7 +898,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[13] = S[13] - (a4 * x3);
     const blw_real_t d4 = S[14] - (a4 * x4);
     T[14] = d4;
-    blw_l1_look(&found, 4U, l[4], limit[4], d4);
+    const blw_real_t v4 = l[4] - (t * x4);
+    l[4] = v4;
+    blw_l1_look(&found, 4U, v4, low[4], high[4], d4);
     const blw_real_t a5 = x5 * share;
     T[15] = S[15] - (a5 * x0);
     T[16] = S[16] - (a5 * x1);
@@ -880,7 +909,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[19] = S[19] - (a5 * x4);
     const blw_real_t d5 = S[20] - (a5 * x5);
     T[20] = d5;
-    blw_l1_look(&found, 5U, l[5], limit[5], d5);
+    const blw_real_t v5 = l[5] - (t * x5);
+    l[5] = v5;
+    blw_l1_look(&found, 5U, v5, low[5], high[5], d5);
     const blw_real_t a6 = x6 * share;
     T[21] = S[21] - (a6 * x0);
     T[22] = S[22] - (a6 * x1);
@@ -890,7 +921,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[26] = S[26] - (a6 * x5);
     const blw_real_t d6 = S[27] - (a6 * x6);
     T[27] = d6;
-    blw_l1_look(&found, 6U, l[6], limit[6], d6);
+    const blw_real_t v6 = l[6] - (t * x6);
+    l[6] = v6;
+    blw_l1_look(&found, 6U, v6, low[6], high[6], d6);
     const blw_real_t a7 = x7 * share;
     T[28] = S[28] - (a7 * x0);
     T[29] = S[29] - (a7 * x1);
@@ -901,7 +934,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[34] = S[34] - (a7 * x6);
     const blw_real_t d7 = S[35] - (a7 * x7);
     T[35] = d7;
-    blw_l1_look(&found, 7U, l[7], limit[7], d7);
+    const blw_real_t v7 = l[7] - (t * x7);
+    l[7] = v7;
+    blw_l1_look(&found, 7U, v7, low[7], high[7], d7);
     const blw_real_t a8 = x8 * share;
     T[36] = S[36] - (a8 * x0);
     T[37] = S[37] - (a8 * x1);
@@ -913,7 +948,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[43] = S[43] - (a8 * x7);
     const blw_real_t d8 = S[44] - (a8 * x8);
     T[44] = d8;
-    blw_l1_look(&found, 8U, l[8], limit[8], d8);
+    const blw_real_t v8 = l[8] - (t * x8);
+    l[8] = v8;
+    blw_l1_look(&found, 8U, v8, low[8], high[8], d8);
     const blw_real_t a9 = x9 * share;
     T[45] = S[45] - (a9 * x0);
     T[46] = S[46] - (a9 * x1);
@@ -926,7 +963,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[53] = S[53] - (a9 * x8);
     const blw_real_t d9 = S[54] - (a9 * x9);
     T[54] = d9;
-    blw_l1_look(&found, 9U, l[9], limit[9], d9);
+    const blw_real_t v9 = l[9] - (t * x9);
+    l[9] = v9;
+    blw_l1_look(&found, 9U, v9, low[9], high[9], d9);
     const blw_real_t a10 = x10 * share;
     T[55] = S[55] - (a10 * x0);
     T[56] = S[56] - (a10 * x1);
@@ -940,7 +979,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[64] = S[64] - (a10 * x9);
     const blw_real_t d10 = S[65] - (a10 * x10);
     T[65] = d10;
-    blw_l1_look(&found, 10U, l[10], limit[10], d10);
+    const blw_real_t v10 = l[10] - (t * x10);
+    l[10] = v10;
+    blw_l1_look(&found, 10U, v10, low[10], high[10], d10);
     const blw_real_t a11 = x11 * share;
     T[66] = S[66] - (a11 * x0);
     T[67] = S[67] - (a11 * x1);
@@ -955,7 +996,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[76] = S[76] - (a11 * x10);
     const blw_real_t d11 = S[77] - (a11 * x11);
     T[77] = d11;
-    blw_l1_look(&found, 11U, l[11], limit[11], d11);
+    const blw_real_t v11 = l[11] - (t * x11);
+    l[11] = v11;
+    blw_l1_look(&found, 11U, v11, low[11], high[11], d11);
     const blw_real_t a12 = x12 * share;
     T[78] = S[78] - (a12 * x0);
     T[79] = S[79] - (a12 * x1);
@@ -971,7 +1014,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[89] = S[89] - (a12 * x11);
     const blw_real_t d12 = S[90] - (a12 * x12);
     T[90] = d12;
-    blw_l1_look(&found, 12U, l[12], limit[12], d12);
+    const blw_real_t v12 = l[12] - (t * x12);
+    l[12] = v12;
+    blw_l1_look(&found, 12U, v12, low[12], high[12], d12);
     const blw_real_t a13 = x13 * share;
     T[91] = S[91] - (a13 * x0);
     T[92] = S[92] - (a13 * x1);
@@ -988,7 +1033,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[103] = S[103] - (a13 * x12);
     const blw_real_t d13 = S[104] - (a13 * x13);
     T[104] = d13;
-    blw_l1_look(&found, 13U, l[13], limit[13], d13);
+    const blw_real_t v13 = l[13] - (t * x13);
+    l[13] = v13;
+    blw_l1_look(&found, 13U, v13, low[13], high[13], d13);
     const blw_real_t a14 = x14 * share;
     T[105] = S[105] - (a14 * x0);
     T[106] = S[106] - (a14 * x1);
@@ -1006,7 +1053,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[118] = S[118] - (a14 * x13);
     const blw_real_t d14 = S[119] - (a14 * x14);
     T[119] = d14;
-    blw_l1_look(&found, 14U, l[14], limit[14], d14);
+    const blw_real_t v14 = l[14] - (t * x14);
+    l[14] = v14;
+    blw_l1_look(&found, 14U, v14, low[14], high[14], d14);
     const blw_real_t a15 = x15 * share;
     T[120] = S[120] - (a15 * x0);
     T[121] = S[121] - (a15 * x1);
@@ -1025,7 +1074,9 @@ static void canonical_l1_fast_sweep(const struct blw_l1 *self, size_t k, blw_rea
     T[134] = S[134] - (a15 * x14);
     const blw_real_t d15 = S[135] - (a15 * x15);
     T[135] = d15;
-    blw_l1_look(&found, 15U, l[15], limit[15], d15);
+    const blw_real_t v15 = l[15] - (t * x15);
+    l[15] = v15;
+    blw_l1_look(&found, 15U, v15, low[15], high[15], d15);
 
     switch (k) {
     case 15U:
@@ -1251,7 +1302,6 @@ static void canonical_l1_fast_balance(const blw_real_t *M, const blw_real_t *v, 
 static const blw_l1_kernels_t canonical_l1_fast = {
     .symv    = canonical_l1_fast_symv,
     .column  = canonical_l1_fast_column,
-    .advance = canonical_l1_fast_advance,
     .sweep   = canonical_l1_fast_sweep,
     .fuse    = canonical_l1_fast_fuse,
     .spread  = canonical_l1_fast_spread,

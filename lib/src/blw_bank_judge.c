@@ -54,23 +54,37 @@ static void rebuild_block(blw_bank_t *self, size_t oldest)
     }
 }
 
+/* @return how many sensors a mask has; list: which ones, in ascending order */
+static size_t list_members(uint16_t mask, size_t m, uint8_t *list)
+{
+    size_t size = 0U;
+
+    for (size_t i = 0U; i < m; i++) {
+        if (blw_bank_has(mask, i)) {
+            list[size] = (uint8_t)i;
+            size++;
+        }
+    }
+    return size;
+}
+
 /* (2) for one subset.  @return the next subset's Z */
 static const blw_real_t *estimate_subset(blw_bank_t *self, size_t i, const blw_real_t *Z)
 {
-    const uint16_t    mask    = self->model->subset_mask[i];
+    uint8_t           list[BLW_BANK_MAX_SENSORS];
     const size_t      n       = self->model->head.plant->n;
     const size_t      m       = self->model->head.plant->m;
-    const size_t      samples = (size_t)self->model->horizon * m;
-    const size_t      columns = (size_t)self->model->horizon * blw_mask_count(mask);
+    const size_t      size    = list_members(self->model->subset_mask[i], m, list);
+    const size_t      columns = (size_t)self->model->horizon * size;
     blw_real_t *const x       = &self->x_fir[i * n];
-    size_t            column  = 0U;
+    const blw_real_t *samples = self->block;
 
     blw_la_fill(n, BLW_R(0.0), x);
-    for (size_t j = 0U; j < samples; j++) {
-        if (blw_bank_has(mask, j % m)) {
-            blw_bank_add_column(n, columns, &Z[column], self->block[j], x);
-            column++;
+    for (size_t column = 0U; column < columns; column += size) {
+        for (size_t s = 0U; s < size; s++) {
+            blw_bank_add_column(n, columns, &Z[column + s], samples[list[s]], x);
         }
+        samples = &samples[m];
     }
     return &Z[n * columns];
 }
@@ -118,20 +132,18 @@ static void respond(blw_bank_t *self, size_t subset, const blw_real_t *Z, size_t
     }
 }
 
-/* No sample of the subset is missing in the block, or none needs to be there. */
-static bool complete(const blw_bank_t *self, size_t subset)
+/* The sensors that lack a sample of the block which needs to be there. */
+static unsigned lacking(const blw_bank_t *self)
 {
-    const uint16_t mask = self->model->subset_mask[subset];
+    unsigned found = 0U;
 
     if (self->model->max_gap > 0U) {
-        return true;
+        return found;
     }
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        if (blw_bank_has(mask, i) && (self->age[i] < self->model->horizon)) {
-            return false;
-        }
+        found |= (self->age[i] < self->model->horizon) ? (1U << i) : 0U;
     }
-    return true;
+    return found;
 }
 
 /* (3) over its threshold; NaN or infinite if the block overflowed. */
@@ -160,10 +172,10 @@ static blw_real_t limited(blw_real_t average, blw_real_t ceiling)
     return (average <= ceiling) ? average : ceiling;
 }
 
-static void average_pair(blw_bank_t *self, size_t pair, size_t oldest)
+static void average_pair(blw_bank_t *self, size_t pair, size_t oldest, unsigned without)
 {
     const blw_bank_model_t *const model = self->model;
-    const bool                    known = complete(self, model->pair[pair]);
+    const bool                    known = (model->subset_mask[model->pair[pair]] & without) == 0U;
     const size_t group   = (pair * model->groups) + ((size_t)self->blocks % model->groups);
     blw_real_t  *average = &self->average[group];
 
@@ -198,10 +210,11 @@ static void decide(blw_bank_t *self)
 
 void blw_bank_judge(blw_bank_t *self)
 {
-    const blw_bank_model_t *const model  = self->model;
-    const size_t                  pairs  = (size_t)model->sets * model->per_set;
-    const size_t                  oldest = ((size_t)self->newest + 1U) % model->horizon;
-    const blw_real_t             *Z      = model->Z;
+    const blw_bank_model_t *const model   = self->model;
+    const size_t                  pairs   = (size_t)model->sets * model->per_set;
+    const size_t                  oldest  = ((size_t)self->newest + 1U) % model->horizon;
+    const unsigned                without = lacking(self);
+    const blw_real_t             *Z       = model->Z;
 
     rebuild_block(self, oldest);
     for (size_t i = 0U; i < model->subsets; i++) {
@@ -211,7 +224,7 @@ void blw_bank_judge(blw_bank_t *self)
         Z = estimate_subset(self, i, Z);
     }
     for (size_t i = 0U; i < pairs; i++) {
-        average_pair(self, i, oldest);
+        average_pair(self, i, oldest, without);
     }
     if (model->window == 0U) {
         decide(self);

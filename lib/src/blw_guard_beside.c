@@ -8,7 +8,6 @@
  * psi(mu) = 1 / |nu| - mu / k is concave, s <= 1, so Newton's method on it decreases monotonically
  * from mu = k / (|g| - k) to the root, two or three steps as a rule. */
 #include "blw_guard_internal.h"
-#include "blw_guard_strips.h"
 #include "blw_la.h"
 
 /* |1 - mu |nu| / k| that ends the search for mu. */
@@ -56,6 +55,37 @@ static const blw_real_t *spectrum(const blw_guard_model_t *model, size_t i, size
     return &model->V[at * r * r];
 }
 
+/* v_x = V x and v_z = V z, all [r]. */
+static void turn(size_t r, const blw_real_t *V, const blw_real_t *x, const blw_real_t *z,
+                 blw_real_t *v_x, blw_real_t *v_z)
+{
+    for (size_t c = 0U; c < r; c++) {
+        blw_real_t sum_x = BLW_R(0.0);
+        blw_real_t sum_z = BLW_R(0.0);
+
+        for (size_t a = 0U; a < r; a++) {
+            sum_x += V[a] * x[a];
+            sum_z += V[a] * z[a];
+        }
+        v_x[c] = sum_x;
+        v_z[c] = sum_z;
+        V += r;
+    }
+}
+
+/* x = V' v, all [r]. */
+static void turn_back(size_t r, const blw_real_t *V, const blw_real_t *v, blw_real_t *x)
+{
+    for (size_t a = 0U; a < r; a++) {
+        blw_real_t sum = BLW_R(0.0);
+
+        for (size_t c = 0U; c < r; c++) {
+            sum += V[(c * r) + a] * v[c];
+        }
+        x[a] = sum;
+    }
+}
+
 /* The step [r] of tau_i to (10), where l_j = 0.  @return whether nu_i /= 0 then. */
 static bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
 {
@@ -71,12 +101,9 @@ static bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
     blw_real_t              square = BLW_R(0.0);
 
     for (size_t a = 0U; a < r; a++) {
-        step[a]   = e[a] - tau[a];
-        before[a] = BLW_R(0.0);
-        turned[a] = BLW_R(0.0);
+        step[a] = e[a] - tau[a];
     }
-    blw_guard_mul(r, r, 0U, r, V, &self->l[i * r], turned);
-    blw_guard_mul(r, r, 0U, r, V, step, before);
+    turn(r, V, &self->l[i * r], step, turned, before);
     for (size_t c = 0U; c < r; c++) {
         g[c] = turned[c] + (s[c] * before[c]);
         square += g[c] * g[c];
@@ -86,9 +113,8 @@ static bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
     const blw_real_t mu       = attacked ? solve_secular(r, k, gamma, s, g) : BLW_R(0.0);
     for (size_t c = 0U; c < r; c++) { /* the change of nu, exact for large nu too, less its sign */
         before[c] = attacked ? (((mu * before[c]) - turned[c]) / (s[c] + mu)) : before[c];
-        step[c]   = BLW_R(0.0);
     }
-    blw_guard_mul_t(r, r, 0U, r, V, before, step, step);
+    turn_back(r, V, before, step);
     return attacked;
 }
 
@@ -113,11 +139,10 @@ void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const 
     const blw_real_t       *s = NULL;
     const blw_real_t *const V = spectrum(model, i, j, &s);
 
-    blw_la_fill(r, BLW_R(0.0), turned);
-    blw_la_fill(r, BLW_R(0.0), y);
-    blw_guard_mul(r, r, 0U, r, V, x, turned);
     for (size_t c = 0U; c < r; c++) {
-        turned[c] = (s[c] > GUARD_PIVOT_MIN) ? (turned[c] / s[c]) : BLW_R(0.0);
+        const blw_real_t v = blw_la_dot(r, &V[c * r], x);
+
+        turned[c] = (s[c] > GUARD_PIVOT_MIN) ? (v / s[c]) : BLW_R(0.0);
     }
-    blw_guard_mul_t(r, r, 0U, r, V, turned, y, y);
+    turn_back(r, V, turned, y);
 }

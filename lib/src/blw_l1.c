@@ -72,10 +72,12 @@ blw_real_t blw_l1_statistic(const blw_l1_t *self)
     for (size_t g = 0U; g < m->n_groups; g++) {
         const blw_real_t norm  = one ? blw_la_abs(self->l[g]) : blw_l1_norm(m, g, self->l);
         const blw_real_t ratio = norm / m->c[g];
-        if (!(ratio <= BLW_REAL_MAX)) {
-            return ratio; /* a NaN must not pass for 0 */
+        if (!(ratio <= max)) {
+            if (!(ratio <= BLW_REAL_MAX)) {
+                return ratio; /* a NaN must not pass for 0 */
+            }
+            max = ratio;
         }
-        max = blw_la_max(max, ratio);
     }
     return max;
 }
@@ -156,12 +158,13 @@ blw_real_t blw_l1_objective(const blw_l1_t *self, const blw_real_t *zeta)
 }
 
 /* An engine that was cut short may have been led astray by rounding: what it leaves counts only if
- * it is better than nu = 0, the Kalman estimate, of which the objective is `kalman`. */
-static BLW_APART void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_t kalman,
-                               blw_real_t *x)
+ * it is better than nu = 0, the Kalman estimate. */
+static void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
 {
     const blw_l1_model_t *const m = self->model;
 
+    m->engine->multiply(self, zeta);
+    const blw_real_t kalman = BLW_R(0.5) * blw_la_dot(m->N, zeta, self->l);
     m->engine->multiply(self, self->tau);
     if (!(blw_l1_objective(self, zeta) < kalman)) {
         blw_la_copy(m->N, zeta, self->tau);
@@ -209,10 +212,9 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     m->engine->multiply(self, zeta);
     info->statistic = blw_l1_statistic(self);
     if ((info->statistic > BLW_R(1.0)) && (info->statistic <= BLW_REAL_MAX)) {
-        const blw_real_t kalman = BLW_R(0.5) * blw_la_dot(m->N, zeta, self->l);
         m->engine->solve(self, zeta, x_hat, info);
         if (!info->converged) {
-            moderate(self, zeta, kalman, x_hat);
+            moderate(self, zeta, x_hat);
         }
     } else { /* the certificate, or a NaN, of which nothing can be said */
         info->kalman    = (info->statistic <= BLW_R(1.0));

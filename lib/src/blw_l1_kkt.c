@@ -7,6 +7,7 @@
  * It stays accurate where W is so ill-conditioned that S and its factors are not, because few rows
  * are in f; and it needs nothing of how A was found, so signs and sizes that survive it certify the
  * minimum.  The matrix is factored by blw_l1_factor.c. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Row and length of the factor: free rows first, then the n columns of G. */
@@ -29,7 +30,7 @@ static void gather(const blw_l1_t *self, const blw_real_t *v, size_t stride, siz
     }
 }
 
-static factor_t factorise(blw_l1_t *self)
+static BLW_APART factor_t factorise(blw_l1_t *self)
 {
     const blw_l1_model_t *const m    = self->model;
     factor_t                    made = {0U, 0U};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The end of a solve on the tableau (blw_l1_tableau.c): l, nu and x from the sweeps are corrected
  * by residuals formed in W and G, and held against (4) of blw_l1.h. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Most corrections by T.  Each leaves of the error what T is wrong by, so the first that is SMALL,
@@ -11,20 +12,26 @@
 /* What rounding leaves of nu_i = zeta_i - tau_i, relative to what it is made of. */
 #define NU_SLACK (BLW_R(16.0) * BLW_REAL_EPS)
 
+/* |l_i| <= c_i outside A, nu_i of the sign of l_i on A; what rounding leaves of them is asked last. */
+static bool row_holds(const blw_l1_t *self, const blw_real_t *zeta, size_t i)
+{
+    const blw_real_t c    = self->model->c[i];
+    const blw_real_t size = blw_la_abs(self->l[i]);
+
+    if (!blw_l1_clipped(self, i)) {
+        return (size <= c) || (size <= (c + blw_l1_slack(c)));
+    }
+    const blw_real_t nu   = (zeta[i] - self->tau[i]) * self->dir[i];
+    const blw_real_t W_ii = self->model->W[blw_la_packed_row(i) + i];
+    return (nu >= BLW_R(0.0)) || (nu >= -(NU_SLACK * (blw_la_abs(zeta[i]) + (W_ii * size))));
+}
+
 bool blw_l1_holds(const blw_l1_t *self, const blw_real_t *zeta)
 {
-    const blw_l1_model_t *const m    = self->model;
-    const blw_real_t           *W_ii = m->W;
-    bool                        ok   = true;
+    bool ok = true;
 
-    for (size_t i = 0U; ok && (i < m->N); i++) {
-        if (blw_l1_clipped(self, i)) {
-            const blw_real_t slack = blw_la_abs(zeta[i]) + blw_la_abs(*W_ii * self->l[i]);
-            ok = ((zeta[i] - self->tau[i]) * self->dir[i]) >= -(NU_SLACK * slack);
-        } else {
-            ok = blw_la_abs(self->l[i]) <= (m->c[i] + blw_l1_slack(m->c[i]));
-        }
-        W_ii += i + 2U;
+    for (size_t i = 0U; ok && (i < self->model->N); i++) {
+        ok = row_holds(self, zeta, i);
     }
     return ok;
 }
@@ -72,7 +79,8 @@ static void split(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
  *     [ dl_f  ]     [  e_f ]   [ w_f ]
  *     [ dnu_A ] = T [ -w_A ] + [ 0   ],     dx = F_f e_f - F_A dnu_A - P h.                     (3)
  * *bound = |dx|.  @return whether dx is a small part of the standard deviations of x. */
-static bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_t *bound)
+static BLW_APART bool correct(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x,
+                              blw_real_t *bound)
 {
     const blw_l1_model_t *const m      = self->model;
     blw_real_t *const           h      = &self->step[m->N];

@@ -8,12 +8,18 @@
  * worse than from the last A under an attack, and rounding errors do not add up from step to step.
  * self->l holds l on f and nu on A meanwhile, so that one sum moves both.
  *     A row i with |l_i| > c_i enters: nu_i moves by t, and, l_A being held at c_A s_A,
- *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i or a nu_j vanishes and leaves.    (2)
- * The objective never rises.  The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is
- * refined and verified in W and G (blw_l1_refine.c), or solved there anew where T is too coarse. */
+ *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i.                                  (2)
+ * A nu_j that turns round on the way leaves next, by (2) with t = nu_j / T_jj.  That takes no more
+ * sweeps than to stop where nu_j vanishes, and less work, but nothing says that it ends: after BOLD
+ * sweeps per row, or where T_ii = 0, (2) stops there and j leaves first; the objective then never
+ * rises.  The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is refined and verified
+ * in W and G (blw_l1_refine.c), or solved there anew where T is too coarse. */
 #include "blw/blw_l1_survey.h"
 #include "blw_cold.h"
 #include "blw_l1_internal.h"
+
+/* Sweeps per row with which rows enter whole. */
+#define BOLD 2U
 
 /* Column k of T, whole. */
 static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
@@ -67,14 +73,14 @@ static void reduce(blw_l1_t *self, blw_real_t share, const blw_real_t *col)
     }
 }
 
-/* The row whose entry gains most. */
-static void survey(const blw_l1_t *self, blw_l1_survey_t *seen)
+/* What comes next.  tau and z hold the ranges of l on f and of nu on A meanwhile. */
+static BLW_APART void survey(const blw_l1_t *self, blw_l1_survey_t *seen)
 {
     const blw_real_t *T_jj = self->T;
 
     *seen = (blw_l1_survey_t){self->model->N, BLW_R(0.0), BLW_R(1.0)};
     for (size_t j = 0U; j < self->model->N; j++) {
-        blw_l1_look(seen, j, self->l[j], self->tau[j], *T_jj);
+        blw_l1_look(seen, j, self->l[j], self->tau[j], self->z[j], *T_jj);
         T_jj += j + 2U;
     }
 }
@@ -88,14 +94,9 @@ static void settle(blw_l1_t *self)
     }
 }
 
-/* Sweep (1) on row k, into A or out of it, its column in self->step; *seen: what comes next. */
-static void sweep(blw_l1_t *self, size_t k, blw_real_t share, blw_l1_survey_t *seen)
+/* sweep() for any N. */
+static BLW_APART void sweep_rows(blw_l1_t *self, size_t k, blw_real_t share, blw_real_t t)
 {
-    if (self->model->fast != NULL) {
-        self->model->fast->sweep(self, k, share, seen);
-        self->T = self->L;
-        return;
-    }
     const size_t            N      = self->model->N;
     const blw_real_t        factor = blw_la_abs(share);
     const blw_real_t *const col    = self->step;
@@ -111,7 +112,20 @@ static void sweep(blw_l1_t *self, size_t k, blw_real_t share, blw_l1_survey_t *s
         Tk += j;
         Tk[k] = factor * col[j];
     }
-    survey(self, seen);
+    blw_la_axpy(N, -t, col, self->l);
+}
+
+/* Sweep (1) on row k, into A or out of it, its column in self->step, and (2); *seen: what comes
+ * next. */
+static void sweep(blw_l1_t *self, size_t k, blw_real_t share, blw_real_t t, blw_l1_survey_t *seen)
+{
+    if (self->model->fast != NULL) {
+        self->model->fast->sweep(self, k, share, t, seen);
+        self->T = self->L;
+    } else {
+        sweep_rows(self, k, share, t);
+        survey(self, seen);
+    }
 }
 
 /* How far nu_i can move by (2), col = column i: *block = the row of A that leaves, or i.
@@ -136,43 +150,22 @@ static blw_real_t ratio_test(const blw_l1_t *self, size_t i, blw_real_t s, const
     return t;
 }
 
-/* z = l - t T_i, T_i in self->step.  @return whether no nu turns round by it. */
-static bool advance(const blw_l1_t *self, blw_real_t t)
-{
-    if (self->model->fast != NULL) {
-        return self->model->fast->advance(self, t);
-    }
-    bool kept = true;
-
-    for (size_t j = 0U; j < self->model->N; j++) {
-        self->z[j] = self->l[j] - (t * self->step[j]);
-        kept       = kept && !((self->z[j] * self->dir[j]) < BLW_R(0.0));
-    }
-    return kept;
-}
-
 /* Row i enters A with sign s, or leaves it with s = 0. */
 static void assign(blw_l1_t *self, size_t i, blw_real_t s)
 {
-    const blw_real_t c = self->model->c[i];
+    const blw_real_t c       = self->model->c[i];
+    const blw_real_t most    = c + blw_l1_slack(c);
+    const bool       clipped = blw_la_abs(s) > BLW_R(0.5);
 
     self->dir[i] = s;
-    self->tau[i] = blw_l1_clipped(self, i) ? BLW_REAL_MAX : (c + blw_l1_slack(c));
-}
-
-/* z becomes l. */
-static void take_step(blw_l1_t *self)
-{
-    blw_real_t *const l = self->l;
-
-    self->l = self->z;
-    self->z = l;
+    self->tau[i] = clipped ? ((s > BLW_R(0.0)) ? BLW_R(0.0) : -BLW_REAL_MAX) : -most;
+    self->z[i]   = clipped ? ((s > BLW_R(0.0)) ? BLW_REAL_MAX : BLW_R(0.0)) : most;
 }
 
 /* Rows of A leave as their nu vanish, until row i can enter with sign s.  @return the sweeps made:
  * none if rounding leaves no way, at most `most`. */
-static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most,
-                         blw_l1_survey_t *seen)
+static BLW_APART unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most,
+                                   blw_l1_survey_t *seen)
 {
     blw_real_t nu     = BLW_R(0.0);
     unsigned   sweeps = 0U;
@@ -194,34 +187,37 @@ static unsigned exchange(blw_l1_t *self, size_t i, blw_real_t s, unsigned most,
             self->l[i] = nu;
             assign(self, i, s);
         }
-        sweep(self, block, BLW_R(1.0) / self->step[block], seen);
+        sweep(self, block, BLW_R(1.0) / self->step[block], BLW_R(0.0), seen);
         sweeps++;
     } while ((block != i) && (sweeps < most));
     return sweeps;
 }
 
-/* Row i enters at once, *seen: what comes next.  @return whether it can; else nothing changed. */
-static bool enter(blw_l1_t *self, size_t i, blw_real_t s, blw_l1_survey_t *seen)
+/* Row i enters, its column in self->step. */
+static void enter(blw_l1_t *self, size_t i, blw_real_t s, blw_l1_survey_t *seen)
 {
-    column(self, i, self->step);
-    if (self->step[i] <= BLW_L1_PIVOT_MIN) {
-        return false;
-    }
     const blw_real_t share = BLW_R(1.0) / self->step[i];
     const blw_real_t t     = (self->l[i] - (s * self->model->c[i])) * share;
 
-    if (!advance(self, t)) {
-        return false;
-    }
-    take_step(self);
-    self->l[i] = t;
     assign(self, i, s);
-    sweep(self, i, share, seen);
-    return true;
+    sweep(self, i, share, t, seen);
+    self->l[i] = t;
+}
+
+/* Row i, whose nu has turned round, leaves; its column in self->step. */
+static void leave(blw_l1_t *self, size_t i, blw_l1_survey_t *seen)
+{
+    const blw_real_t share = BLW_R(1.0) / self->step[i];
+    const blw_real_t t     = self->l[i] * share;
+    const blw_real_t held  = self->model->c[i] * self->dir[i];
+
+    assign(self, i, BLW_R(0.0));
+    sweep(self, i, share, t, seen);
+    self->l[i] = held - t;
 }
 
 /* Sweeps until no row violates |l_i| <= c_i, as far as T can tell. */
-static void pivot(blw_l1_t *self, blw_l1_info_t *info)
+static BLW_APART void pivot(blw_l1_t *self, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m = self->model;
     blw_l1_survey_t             seen;
@@ -231,20 +227,21 @@ static void pivot(blw_l1_t *self, blw_l1_info_t *info)
         const size_t     i      = seen.best;
         const blw_real_t s      = (self->l[i] > BLW_R(0.0)) ? BLW_R(1.0) : BLW_R(-1.0);
         unsigned         sweeps = 1U;
-        if (!enter(self, i, s, &seen)) {
+        column(self, i, self->step);
+        if (blw_l1_clipped(self, i)) {
+            leave(self, i, &seen);
+        } else if ((self->step[i] > BLW_L1_PIVOT_MIN) && (info->iterations < (BOLD * m->N))) {
+            enter(self, i, s, &seen);
+        } else {
             sweeps    = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations, &seen);
             seen.best = (sweeps > 0U) ? seen.best : m->N;
         }
         info->iterations = (uint16_t)(info->iterations + sweeps);
     }
-    if (self->l != &self->tau[m->N]) { /* where what follows does not write */
-        blw_la_copy(m->N, self->l, self->z);
-        take_step(self);
-    }
 }
 
 /* T for the present A, from S; a row that depends on those before it leaves A. */
-static void rebuild(blw_l1_t *self)
+static BLW_APART void rebuild(blw_l1_t *self)
 {
     const blw_l1_model_t *const m = self->model;
     blw_l1_survey_t             seen;
@@ -254,7 +251,7 @@ static void rebuild(blw_l1_t *self)
         if (blw_l1_clipped(self, i)) {
             column(self, i, self->step);
             if (self->step[i] > BLW_L1_PIVOT_MIN) {
-                sweep(self, i, BLW_R(1.0) / self->step[i], &seen);
+                sweep(self, i, BLW_R(1.0) / self->step[i], BLW_R(0.0), &seen);
             } else {
                 self->l[i] = self->model->c[i] * self->dir[i];
                 assign(self, i, BLW_R(0.0));
@@ -265,7 +262,7 @@ static void rebuild(blw_l1_t *self)
 
 /* nu = 0 on the rows of A that the verification found turned round; on the others l becomes nu.
  * @return whether there were any. */
-static bool drop_turned(blw_l1_t *self, const blw_real_t *zeta)
+static BLW_APART bool drop_turned(blw_l1_t *self, const blw_real_t *zeta)
 {
     bool dropped = false;
 
@@ -284,8 +281,9 @@ static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_
 {
     const blw_l1_model_t *const m       = self->model;
     bool                        dropped = false;
-    bool                        intact  = false; /* T is that of the present A */
+    bool                        intact  = true; /* T is that of the present A */
 
+    self->T = m->S;
     for (size_t i = 0U; i < m->N; i++) {
         assign(self, i, BLW_R(0.0));
     }

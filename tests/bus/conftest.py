@@ -103,12 +103,15 @@ def on(*transports: str) -> pytest.MarkDecorator:
 
 
 @pytest.fixture(scope="session")
-def record(prepared: Prepared,
-           tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Recorded]:
-    """The record of a transport, made when it is first asked for."""
+def record(prepared: Prepared, tmp_path_factory: pytest.TempPathFactory,
+           worker_id: str) -> Callable[[str], Recorded]:
+    """The record of a transport, made when it is first asked for; by one worker only."""
+    base = tmp_path_factory.getbasetemp()
+    of_all_workers = base if worker_id == "master" else base.parent
 
     @cache
     def made(transport: str) -> Recorded:
+        (of_all_workers / f"{transport}.made").mkdir()  # fails where the tests are not grouped
         out = tmp_path_factory.mktemp(transport)
         frames = os.environ.get("BULWARK_FRAMES", "10000")
         return Recorded(transport, out, call([

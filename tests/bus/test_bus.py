@@ -8,7 +8,6 @@ import csv
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import Prepared, Recorded, on
 
@@ -22,9 +21,6 @@ FAULTS = [pytest.param(transport, fault, marks=pytest.mark.xdist_group(transport
 SENSORS = 4
 INPUTS = 1
 FAR = 0.3
-#: Share of the steps that a standstill of the machine leaves alone; steps after one is over.
-MOST_ALIKE = 0.9
-RECOVERED = 10
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -114,12 +110,9 @@ def assert_attacked_as_in_one_process(recorded: Recorded, prepared: Prepared, ki
     """The same exclusions, and estimates but for the rounding of y before the attacker sees it."""
     there = rows(recorded.out / f"gateway_{kind}" / "guard.csv")
     here = rows(prepared.inproc / kind / "guard.csv")
-    alike = [one["excluded"] == other["excluded"]
-             and float(one["cart_m"]) == pytest.approx(float(other["cart_m"]), abs=1e-5)
-             for one, other in zip(there, here, strict=True)]
-    # A machine that stands still for longer than the deadline loses samples, which the node counts.
-    late = recorded.case(f"gateway_{kind}")["node"]["guard"]["lost"] > 0
-    assert np.mean(alike) >= (0.5 if late else 1.0)
+    assert [row["excluded"] for row in there] == [row["excluded"] for row in here]
+    for one, other in zip(there, here, strict=True):
+        assert float(one["cart_m"]) == pytest.approx(float(other["cart_m"]), abs=1e-5)
     log = rows(prepared.inproc / kind / "log.csv")
     attacked = [row for row in log if float(row["a:cart2"] or 0.0)]
     said = json.loads(recorded.case(f"gateway_{kind}")["said"][2])
@@ -148,13 +141,9 @@ def test_suppressed_sensor_is_missing_as_in_one_process(recorded: Recorded,
     node = recorded.case("gateway_drop")["node"]["guard"]
     there = rows(recorded.out / "gateway_drop" / "guard.csv")
     here = rows(prepared.inproc / "drop" / "guard.csv")
-    assert len(there) == len(here)
-    pairs = [(a["status"], b["status"]) for a, b in zip(there, here)]
-    assert sum("missing" in alone for _, alone in pairs) == 100
-    assert all("missing" in bus for bus, alone in pairs if "missing" in alone)
-    # A machine that stands still for longer than the deadline loses other samples, too.
-    assert sum(bus == alone for bus, alone in pairs) >= MOST_ALIKE * len(pairs)
-    assert node["lost"] >= (100 if recorded.transport == "can" else 0)  # LCM says "no sample"
+    assert [row["status"] for row in there] == [row["status"] for row in here]
+    assert sum("missing" in row["status"] for row in there) == 100
+    assert node["lost"] == (100 if recorded.transport == "can" else 0)  # LCM says "no sample"
 
 
 @on("lcm", "can")
@@ -186,8 +175,7 @@ def test_lost_link_is_reported_and_recovered(recorded: Recorded) -> None:
     assert node["no_sync"] >= 5
     assert done["plant"]["link"]["lost"] >= 1
     assert node["steps"] - node["blind"] >= 60
-    end = rows(recorded.out / "link_lost" / "guard.csv")[-RECOVERED:]
-    assert any("blind" not in row["status"] for row in end)
+    assert "blind" not in rows(recorded.out / "link_lost" / "guard.csv")[-1]["status"]
     for said in done["said"]:
         assert told(said) == ["link lost", "back"]
 

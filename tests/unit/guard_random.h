@@ -140,7 +140,12 @@ static inline void random_pairs(guard_random_t *made, size_t m, size_t r)
             }
         }
         random_eigen(r, T, V);
-        to = random_strips(&V[0][0], RANDOM_R, r, r, to);
+        for (size_t a = 0U; a < r; a++) {
+            for (size_t c = 0U; c < r; c++) {
+                *to = (blw_real_t)V[a][c];
+                to++;
+            }
+        }
         for (size_t c = 0U; c < r; c++) {
             *s = (blw_real_t)fmax(0.0, T[c][c]);
             s++;

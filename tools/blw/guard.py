@@ -247,7 +247,7 @@ def matrices(
     vectors, values = guard_fusion.excluded_spectra(fusion) if pairs else (np.zeros((0, 0)),) * 2
     b = fusion.b[:, : fusion.reach] * weight[:, None]
     banded = [rows_of(L, fusion.reach) for L in fusion.Lam]
-    turned = [strips(V) for per_sensor in vectors for V in per_sensor]
+    turned = [V.ravel() for per_sensor in vectors for V in per_sensor]
     return {
         "Lam": table(np.concatenate(banded), "by rows, banded"),
         "b": table(b, f"[{bank.m}][{fusion.reach}]"),

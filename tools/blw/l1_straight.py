@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from blw.straight import loads, names, statement
 from blw.tables import Code, Struct
 
-#: Rows that the loops take at a time.
-STRIP = 3
-
 #: Most rows of zeta: beyond, the loops cost little more and far less flash.
 MOST_ROWS = 16
 
@@ -26,28 +23,45 @@ def kernels(suffix: str, N: int, n: int) -> Struct | None:
     """blw_l1_kernels_t, or None where the loops serve better."""
     if N > MOST_ROWS:
         return None
-    members = {"symv": symv(N), "column": column(N), "advance": advance(N), "sweep": sweep(N),
+    members = {"symv": symv(N), "column": column(N), "sweep": sweep(N),
                "fuse": fuse(n, N), "spread": spread(n, N), "predict": predict(n, N),
                "balance": balance(n, N)}
     return Struct("blw_l1_kernels_t", suffix, members)
 
 
 def symv(N: int) -> Code:
-    """blw_l1_symv_kernel_t."""
-    x = names("x", N)
-    lines = loads("x", x)
-    whole = N - N % STRIP
-    strips = [range(i, i + STRIP) for i in range(0, whole, STRIP)]
-    for strip in [*strips, *(range(i, i + 1) for i in range(whole, N))]:
-        for i in strip:
-            terms = [f"(S[{at(i, j)}] * {x[j]})" for j in range(strip.stop)]
-            lines += statement(f"blw_real_t y{i} =", " + ".join(terms) + ";")
-        for j in range(strip.start):
-            terms = [f"(S[{at(i, j)}] * {x[i]})" for i in strip]
-            lines += statement(f"y{j} =", " + ".join([f"y{j}", *terms]) + ";")
-    lines += [f"y[{i}] = y{i};" for i in range(N)]
+    """blw_l1_symv_kernel_t: every S_ij is loaded once, for y_i and y_j.  Half of the sums at a time
+    stay in registers: those of the first rows, also while these meet the others, then the others.
+    A store after each row keeps the compiler from loading ahead what it has no registers for.
+    """
+    half = (N + 1) // 2
+    lines = []
+    for i in range(half):
+        lines += [f"const blw_real_t x{i} = x[{i}];",
+                  *statement(f"blw_real_t y{i} =", row(i, range(i + 1), "x") + ";"),
+                  *meeting(i, range(i), "x", "y"), f"y[{i}] = y{i};"]
+    for i in range(half, N):
+        lines += [f"const blw_real_t x{i} = x[{i}];",
+                  *statement(f"const blw_real_t y{i} =", row(i, range(half), "x") + ";"),
+                  *meeting(i, range(half), "x", "y"), f"y[{i}] = y{i};"]
+    lines += [f"y[{i}] = y{i};" for i in range(half)]
+    for i in range(half, N):
+        lines += [f"const blw_real_t u{i} = x[{i}];",
+                  *statement(f"blw_real_t v{i} =", f"y[{i}] + {row(i, range(half, i + 1), 'u')};"),
+                  *meeting(i, range(half, i), "u", "v"), f"y[{i}] = v{i};"]
+    lines += [f"y[{i}] = v{i};" for i in range(half, N - 1)]
     return Code("void", "const blw_real_t *S, const blw_real_t *x, blw_real_t *y", tuple(lines),
                 f"y = S x: {N * N} multiply-adds")
+
+
+def row(i: int, columns: range, x: str) -> str:
+    """What row i of S gives y_i in these columns."""
+    return " + ".join(f"(S[{at(i, j)}] * {x}{j})" for j in columns)
+
+
+def meeting(i: int, rows: range, x: str, y: str) -> list[str]:
+    """What row i of S, as a column, gives the rows above."""
+    return [f"{y}{j} += S[{at(i, j)}] * {x}{i};" for j in rows]
 
 
 def column(N: int) -> Code:
@@ -61,24 +75,13 @@ def column(N: int) -> Code:
                 "column k of T")
 
 
-def advance(N: int) -> Code:
-    """blw_l1_advance_kernel_t."""
-    lines = ["const blw_real_t *const l = self->l;", "const blw_real_t *const dir = self->dir;",
-             "const blw_real_t *const col = self->step;", "blw_real_t *const z = self->z;", ""]
-    for j in range(N):
-        lines += [f"const blw_real_t v{j} = l[{j}] - (t * col[{j}]);", f"z[{j}] = v{j};",
-                  f"if ((v{j} * dir[{j}]) < BLW_R(0.0)) {{", "    return false;", "}"]
-    return Code("bool", "const struct blw_l1 *self, blw_real_t t", (*lines, "return true;"),
-                "z = l - t col")
-
-
 def sweep(N: int) -> Code:
     """blw_l1_sweep_kernel_t."""
     x = names("x", N)
     lines = ["const blw_real_t factor = (share < BLW_R(0.0)) ? -share : share;",
              "const blw_real_t *const col = self->step;", "const blw_real_t *const S = self->T;",
-             "const blw_real_t *const l = self->l;", "const blw_real_t *const limit = self->tau;",
-             "blw_real_t *const T = self->L;",
+             "const blw_real_t *const low = self->tau;", "const blw_real_t *const high = self->z;",
+             "blw_real_t *const l = self->l;", "blw_real_t *const T = self->L;",
              "blw_real_t *const row = &T[(k * (k + 1U)) / 2U];",
              "blw_real_t *const below = &T[k];", *loads("col", x),
              f"blw_l1_survey_t found = {{{N}U, BLW_R(0.0), BLW_R(1.0)}};", ""]
@@ -87,13 +90,14 @@ def sweep(N: int) -> Code:
         lines += [f"T[{at(i, j)}] = S[{at(i, j)}] - (a{i} * {x[j]});" for j in range(i)]
         lines += [f"const blw_real_t d{i} = S[{at(i, i)}] - (a{i} * {x[i]});",
                   f"T[{at(i, i)}] = d{i};",
-                  f"blw_l1_look(&found, {i}U, l[{i}], limit[{i}], d{i});"]
+                  f"const blw_real_t v{i} = l[{i}] - (t * {x[i]});", f"l[{i}] = v{i};",
+                  f"blw_l1_look(&found, {i}U, v{i}, low[{i}], high[{i}], d{i});"]
     upper = [f"row[{j}] = factor * {x[j]};" for j in range(N)]
     lower = [f"below[{at(j, 0)}] = factor * {x[j]};" for j in range(1, N)]
     lines += ["", *descend(upper), "row[k] = -share;", *ascend(lower), "*seen = found;"]
     return Code("void", "const struct blw_l1 *self, size_t k, blw_real_t share,\n"
-                "    blw_l1_survey_t *seen", tuple(lines),
-                f"T swept on row k and surveyed: {N * (N + 1) // 2} multiply-adds")
+                "    blw_real_t t, blw_l1_survey_t *seen", tuple(lines),
+                f"T swept on row k, l -= t col, surveyed: {N * (N + 3) // 2} multiply-adds")
 
 
 def fuse(n: int, N: int) -> Code:

@@ -86,7 +86,7 @@ typedef struct blw_guard_model {
     const blw_real_t *Lam;     /**< [m][r x r] by rows, each from `reach` left of the diagonal */
     const blw_real_t *b;       /**< [m][reach], the rest of b_i is 0; N = m r */
     const blw_real_t *S;       /**< for i = 1..m-1 [r x i r] in strips: S below its diagonal */
-    const blw_real_t *V;       /**< [m][m-1][r x r] in strips: for sensor i and every other j */
+    const blw_real_t *V;       /**< [m][m-1][r x r] for sensor i and every other j */
     const blw_real_t *s;       /**< [m][m-1][r]  V'diag(s) V = S_ii - S_ij S_ji; NULL without
                                         pairs, as V */
     const blw_real_t *Fu;      /**< [n_u x N] in strips; NULL if n_u = 0 */

@@ -38,7 +38,7 @@ extern const blw_l1_ops_t blw_l1_newton_ops;
 
 /** What a pass over the rows of the tableau found. */
 typedef struct blw_l1_survey {
-    size_t     best; /**< the row whose entry gains most, or N */
+    size_t     best; /**< the row whose sweep gains most, or N */
     blw_real_t gain; /**< what it gains is gain / over */
     blw_real_t over; /**< > 0 */
 } blw_l1_survey_t;
@@ -47,12 +47,10 @@ typedef struct blw_l1_survey {
 typedef void (*blw_l1_symv_kernel_t)(const blw_real_t *S, const blw_real_t *x, blw_real_t *y);
 /** Column k of the tableau T, [N]. */
 typedef void (*blw_l1_column_kernel_t)(size_t k, const blw_real_t *T, blw_real_t *col);
-/** z = l - t col, col in self->step.  @return whether no nu turns round by it. */
-typedef bool (*blw_l1_advance_kernel_t)(const struct blw_l1 *self, blw_real_t t);
-/** self->T swept on row k, into self->L, and what comes next (blw_l1_survey.h); self->step = its
- *  column k, share = 1 / T_kk. */
+/** self->T swept on row k, into self->L, l -= t col, and what comes next (blw_l1_survey.h); col =
+ *  self->step = column k, share = 1 / T_kk. */
 typedef void (*blw_l1_sweep_kernel_t)(const struct blw_l1 *self, size_t k, blw_real_t share,
-                                      blw_l1_survey_t *seen);
+                                      blw_real_t t, blw_l1_survey_t *seen);
 
 /** A product with a matrix M, F [n x N] or G [N x n]. */
 typedef void (*blw_l1_product_kernel_t)(const blw_real_t *M, const blw_real_t *v, blw_real_t *out);
@@ -62,7 +60,6 @@ typedef void (*blw_l1_product_kernel_t)(const blw_real_t *M, const blw_real_t *v
 typedef struct blw_l1_kernels {
     blw_l1_symv_kernel_t    symv;
     blw_l1_column_kernel_t  column;
-    blw_l1_advance_kernel_t advance;
     blw_l1_sweep_kernel_t   sweep;
     blw_l1_product_kernel_t fuse;    /**< out = F v */
     blw_l1_product_kernel_t spread;  /**< out = F' v */
@@ -82,8 +79,8 @@ typedef struct blw_l1_model {
     const blw_real_t   *F;              /**< [n x N] */
     const blw_real_t   *c;              /**< [n_groups] thresholds, > 0 */
     const blw_real_t   *M;              /**< ADMM: [N (N + 1) / 2] (Z Z' + rho I)^-1, packed lower;
-                                           newton: S with W + D for W, D = rho sqrt(W_ii) / c_g with i
-                                           the first row of g; NULL otherwise */
+                                           newton: S with W + D for W, D = rho sqrt(W_ii) / c_g with
+                                           i the first row of g; NULL otherwise */
     const blw_real_t   *S; /**< tableau, newton: [N (N + 1) / 2] Z Z', packed lower, or NULL */
     const blw_real_t   *W; /**< tableau, newton: [N (N + 1) / 2] packed lower, or NULL */
     const blw_real_t   *G; /**< tableau, newton: [N x n], or NULL */
