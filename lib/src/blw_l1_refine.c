@@ -12,7 +12,7 @@
 /* What rounding leaves of nu_i = zeta_i - tau_i, relative to what it is made of. */
 #define NU_SLACK (BLW_R(16.0) * BLW_REAL_EPS)
 
-/* |l_i| <= c_i outside A, nu_i of the sign of l_i on A; what rounding leaves of them is asked last. */
+/* |l_i| <= c_i outside A, nu_i of the sign of l_i on A; what rounding may leave is asked last. */
 static bool row_holds(const blw_l1_t *self, const blw_real_t *zeta, size_t i)
 {
     const blw_real_t c    = self->model->c[i];

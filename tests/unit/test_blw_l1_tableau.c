@@ -4,7 +4,7 @@
 #include "support.h"
 
 #include "blw/blw_l1.h"
-#include "blw_la.h"
+#include "blw_l1_internal.h"
 
 /* I - 1 1'/3 and I, packed lower; zeta = G x; F W F'. */
 static const blw_real_t S_exact[6] = {
@@ -59,6 +59,19 @@ static void test_solve_given_a_dependent_row_lets_another_leave_first(void)
     TEST_ASSERT_EQUAL_UINT16(4U, info.iterations);
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.5, x[0]);
     TEST_ASSERT_REAL_WITHIN(0.0, dependent[2], l1.tau[2]); /* nu_2 = 0 again */
+}
+
+/* After two sweeps per row every entry stops where another nu vanishes: here as many sweeps. */
+static void test_solve_given_much_work_done_enters_with_care(void)
+{
+    made.l1.c              = wide;
+    made.l1.max_iterations = 12U;
+    info                   = (blw_l1_info_t){.iterations = 6U};
+    made.l1.engine->multiply(&l1, dependent);
+    made.l1.engine->solve(&l1, dependent, x, &info);
+    TEST_ASSERT_TRUE(info.converged);
+    TEST_ASSERT_EQUAL_UINT16(6U + 4U, info.iterations);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.5, x[0]);
 }
 
 static void test_solve_given_the_bound_within_an_entry_reports_it(void)
@@ -128,6 +141,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_solve_given_a_dependent_row_lets_another_leave_first);
+    RUN_TEST(test_solve_given_much_work_done_enters_with_care);
     RUN_TEST(test_solve_given_the_bound_within_an_entry_reports_it);
     RUN_TEST(test_solve_given_a_coarse_tableau_falls_back_to_the_factors_of_W);
     RUN_TEST(test_solve_given_a_row_that_should_not_be_in_drops_it);

@@ -8,8 +8,8 @@
 extern "C" {
 #endif
 
-/** Least diagonal element of the tableau to divide by: that of S is about 1.  Below it a row depends
- *  on those that are in. */
+/** Least diagonal element of the tableau to divide by: that of S is about 1.  Below it a row
+ *  depends on those that are in. */
 #define BLW_L1_PIVOT_MIN (BLW_R(64.0) * BLW_REAL_EPS)
 
 /** A nu that has turned round comes first: its gain counts so many times. */
