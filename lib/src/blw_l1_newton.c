@@ -52,7 +52,7 @@
 
 /* Direction and side of every group for the present nu; with keep, only directions.
  * @return groups that changed sides or turned round. */
-static size_t aim(const blw_l1_newton_t *at, bool keep)
+static BLW_APART size_t aim(const blw_l1_newton_t *at, bool keep)
 {
     blw_l1_t *const             self  = at->l1;
     const blw_l1_model_t *const m     = self->model;
@@ -97,7 +97,7 @@ static blw_real_t slope(const blw_l1_newton_t *at, blw_real_t alpha, blw_real_t 
 }
 
 /* Share of the step that does not pass the minimum along it by far. */
-static blw_real_t search(const blw_l1_newton_t *at)
+static BLW_APART blw_real_t search(const blw_l1_newton_t *at)
 {
     const blw_l1_t *const self  = at->l1;
     const size_t          N     = self->model->N;
@@ -160,7 +160,7 @@ static void restore(blw_l1_newton_t *at)
 }
 
 /* The next kappa: nu_g = D l_g on groups inside, and l and x follow. */
-static void tighten(blw_l1_newton_t *at)
+static BLW_APART void tighten(blw_l1_newton_t *at)
 {
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
@@ -191,7 +191,7 @@ static void loosen(blw_l1_newton_t *at)
 }
 
 /* Groups whose nu has turned round go inside.  @return their number. */
-static size_t take_back(const blw_l1_newton_t *at)
+static BLW_APART size_t take_back(const blw_l1_newton_t *at)
 {
     const blw_l1_t *const       self  = at->l1;
     const blw_l1_model_t *const m     = self->model;
@@ -215,7 +215,7 @@ static size_t take_back(const blw_l1_newton_t *at)
 }
 
 /* Of the groups inside with |l_g| > c_g the worst goes outside.  @return their number. */
-static size_t let_out(const blw_l1_newton_t *at)
+static BLW_APART size_t let_out(const blw_l1_newton_t *at)
 {
     const blw_l1_t *const       self  = at->l1;
     const blw_l1_model_t *const m     = self->model;
@@ -242,7 +242,7 @@ static size_t let_out(const blw_l1_newton_t *at)
 }
 
 /* |dx|; whether it is a small part of the standard deviations of x in *small. */
-static blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
+static BLW_APART blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
 {
     const blw_l1_model_t *const m  = at->l1->model;
     const blw_real_t *const     dx = at->l1->step;
@@ -256,7 +256,7 @@ static blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
 }
 
 /* Steps with kappa = 0.  @return whether they end in a minimum. */
-static bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
+static BLW_APART bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
 {
     const blw_l1_model_t *const m     = at->l1->model;
     const blw_real_t            kappa = at->kappa;
@@ -281,7 +281,7 @@ static bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
 
 /* Newton steps for one kappa, *quiet if no group has changed sides.
  * @return whether they settled. */
-static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
+static BLW_APART bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
 {
     bool       settled = false;
     blw_real_t alpha   = BLW_R(1.0);
@@ -302,7 +302,7 @@ static bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
 }
 
 /* kappa = 0 from the point that was kept, or back to it.  @return whether that is the minimum. */
-static bool try_to_finish(blw_l1_newton_t *at, blw_l1_info_t *info)
+static BLW_APART bool try_to_finish(blw_l1_newton_t *at, blw_l1_info_t *info)
 {
     const bool done = finish(at, info);
 

@@ -62,25 +62,47 @@ static void measure(const blw_l1_newton_t *at, const blw_real_t *t, blw_real_t *
     }
 }
 
-/* (2) for group g, tau = zeta - nu; the sum zeta - t + u is in step. */
+/* (2) for group g; a group inside needs no square root. */
 static void pass_group(const blw_l1_newton_t *at, size_t g, blw_real_t *t, blw_real_t *u)
 {
-    blw_l1_t *const             self  = at->l1;
-    const blw_l1_model_t *const m     = self->model;
-    const blw_real_t            limit = m->rho * self->A[g];
-    const blw_real_t            D     = limit / m->c[g];
-    const size_t                end   = m->first[g + 1U];
+    const blw_l1_t *const       self    = at->l1;
+    const blw_l1_model_t *const m       = self->model;
+    const size_t                first   = m->first[g];
+    const size_t                end     = m->first[g + 1U];
+    const blw_real_t            limit   = m->rho * self->A[g];
+    const blw_real_t            D       = limit / m->c[g];
+    blw_real_t                  squares = BLW_R(0.0);
+    blw_real_t                  part    = BLW_R(0.0);
 
-    for (size_t j = m->first[g]; j < end; j++) {
+    for (size_t j = first; j < end; j++) {
         const blw_real_t nu = (t[j] - u[j]) + (D * self->l[j]);
-        self->tau[j]        = self->step[j] - (D * self->l[j]);
         u[j] += t[j] + (RELAXATION * (nu - t[j]));
+        squares += u[j] * u[j];
     }
-    const blw_real_t norm = blw_l1_norm(m, g, u);
-    const blw_real_t part = (norm > limit) ? (BLW_R(1.0) - (limit / norm)) : BLW_R(0.0);
-    for (size_t j = m->first[g]; j < end; j++) {
+    if (squares > (limit * limit)) {
+        part = BLW_R(1.0) - (limit / blw_la_sqrt(squares));
+    }
+    for (size_t j = first; j < end; j++) {
         t[j] = part * u[j];
         u[j] -= t[j];
+    }
+}
+
+/* tau = zeta - nu after the last pass; kappa no less than it has left open, |nu - t|. */
+static void finish_passes(blw_l1_newton_t *at, const blw_real_t *t)
+{
+    blw_l1_t *const             self = at->l1;
+    const blw_l1_model_t *const m    = self->model;
+
+    at->kappa = KAPPA_FIRST;
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        const blw_real_t D = (m->rho * self->A[g]) / m->c[g];
+        for (size_t j = m->first[g]; j < m->first[g + 1U]; j++) {
+            self->tau[j]  = self->step[j] - (D * self->l[j]);
+            self->step[j] = (at->zeta[j] - self->tau[j]) - t[j];
+        }
+        const blw_real_t gap = blw_l1_norm(m, g, self->step) / self->A[g];
+        at->kappa            = blw_la_max(at->kappa, KAPPA_GAP * gap);
     }
 }
 
@@ -116,14 +138,7 @@ void blw_l1_newton_start(blw_l1_newton_t *at)
             pass_group(at, g, t, u);
         }
     }
-    at->kappa = KAPPA_FIRST;
-    for (size_t i = 0U; i < m->N; i++) {
-        self->step[i] = (at->zeta[i] - self->tau[i]) - t[i];
-    }
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t gap = blw_l1_norm(m, g, self->step) / self->A[g];
-        at->kappa            = blw_la_max(at->kappa, KAPPA_GAP * gap);
-    }
+    finish_passes(at, t);
     take_sides(at, t);
     blw_la_gemv(m->n, m->N, m->F, self->tau, at->x);
 }

@@ -7,6 +7,7 @@
  * is solved for the change from the present point, so that rounding errors do not stay.  R, a small
  * part of the information on x, holds x where E' G leaves it open; it only damps the change.
  * The matrix is factored by blw_l1_factor.c. */
+#include "blw_cold.h"
 #include "blw_l1_newton.h"
 
 /* R relative to the information of the Kalman estimate. */
@@ -141,7 +142,8 @@ static size_t add_rows(const blw_l1_newton_t *at, size_t g, size_t r)
     return size;
 }
 
-static void factorise(blw_l1_newton_t *at)
+/* The matrix of (1). */
+static BLW_APART void build(const blw_l1_newton_t *at)
 {
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
@@ -156,11 +158,10 @@ static void factorise(blw_l1_newton_t *at)
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[at->free]);
         Lr[at->free + k] = -DAMPING / m->P[blw_la_packed_row(k) + k];
     }
-    at->weak = blw_l1_factor(self, at->free, at->free + m->n, PIVOT2_MIN);
 }
 
 /* v = zeta - W l - G x - D l. */
-static void residual(const blw_l1_newton_t *at, const blw_real_t *l, blw_real_t *v)
+static BLW_APART void residual(const blw_l1_newton_t *at, const blw_real_t *l, blw_real_t *v)
 {
     const blw_l1_model_t *const m = at->l1->model;
 
@@ -187,7 +188,7 @@ static void take_known(const blw_l1_t *self, blw_real_t *l)
 }
 
 /* Solve (1) for the right-hand side in self->step; dx to its first n numbers, l += E l_E. */
-static void solve_system(blw_l1_newton_t *at, blw_real_t *l)
+static BLW_APART void solve_system(blw_l1_newton_t *at, blw_real_t *l)
 {
     blw_l1_t *const self = at->l1;
 
@@ -238,7 +239,8 @@ void blw_l1_newton_step(blw_l1_newton_t *at)
     const blw_l1_model_t *const m    = self->model;
 
     at->free = list_columns(self);
-    factorise(at);
+    build(at);
+    at->weak = blw_l1_factor(self, at->free, at->free + m->n, PIVOT2_MIN);
     take_known(self, self->z);
     residual(at, self->z, self->step);
     gather(self, at->free, self->step, 1U, self->step);
