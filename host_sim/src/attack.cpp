@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "attack.h"
+#include "constants.h"
 #include <algorithm>
 #include <cmath>
 
@@ -8,7 +9,6 @@ namespace sim
 namespace
 {
 
-const double TWO_PI = 6.283185307179586476925286766559;
 /* Streams of random numbers below this one belong to the plant. */
 const std::uint64_t FIRST_STREAM = 100U;
 

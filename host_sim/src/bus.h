@@ -22,6 +22,10 @@
 namespace sim
 {
 
+/** For a frame to come, in milliseconds; a second in microseconds. */
+inline constexpr int           WAIT_MS = 1;
+inline constexpr std::uint64_t SECOND  = 1000000U;
+
 struct BusOptions {
     Options       run;              /* input = scenario, design, out, methods, seed, json */
     std::string   link;             /* the node's; see link.h */

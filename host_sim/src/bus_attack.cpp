@@ -21,8 +21,6 @@ namespace sim
 namespace
 {
 
-const int           WAIT_MS      = 1;
-const std::uint64_t SECOND       = 1000000U;
 const int           BABBLE       = 12;  /* frames at a time */
 const double        FORGED       = 1e3; /* far from any sample */
 const std::uint64_t ANOTHER_STEP = 300U;

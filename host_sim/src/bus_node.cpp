@@ -15,10 +15,8 @@ namespace sim
 namespace
 {
 
-const int           WAIT_MS  = 1;
-const std::uint64_t SECOND   = 1000000U;
-const std::uint8_t  BABBLING = 8U;
-const int           NO_RUN   = 1;
+const std::uint8_t BABBLING = 8U;
+const int          NO_RUN   = 1;
 
 const blw_estimator_ops_t *ops_of(const BusOptions &options)
 {

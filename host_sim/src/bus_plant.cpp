@@ -15,9 +15,8 @@ namespace sim
 namespace
 {
 
-const char *const TRUTH   = "truth";
-const int         WAIT_MS = 1;
-const int         ENDS    = 3; /* times that the end is said: nobody confirms it */
+const char *const TRUTH = "truth";
+const int         ENDS  = 3; /* times that the end is said: nobody confirms it */
 /* More inputs than a mask has bits are all valid all the same: an input is never missing. */
 const blw_mask_t ALL = ~static_cast<blw_mask_t>(0);
 

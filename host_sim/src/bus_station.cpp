@@ -10,9 +10,6 @@ namespace sim
 namespace
 {
 
-const int           WAIT_MS = 1;
-const std::uint64_t SECOND  = 1000000U;
-
 class SensorNode
 {
 public:

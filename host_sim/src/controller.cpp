@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "controller.h"
+#include "constants.h"
 #include "error.h"
 #include <cmath>
 
@@ -7,8 +8,6 @@ namespace sim
 {
 namespace
 {
-
-const double TWO_PI = 6.283185307179586476925286766559;
 
 Wave::Shape parse_shape(const TomlTable &table)
 {

@@ -1,19 +1,17 @@
 /* SPDX-License-Identifier: MIT */
 #include "log.h"
+#include "constants.h"
 #include "csv.h"
 #include "error.h"
 #include "text.h"
 #include "toml_read.h"
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace sim
 {
 namespace
 {
-
-const double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
 struct Column {
     std::optional<std::size_t> index; /* nothing: the log has no such column */

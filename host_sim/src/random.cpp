@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
 #include "random.h"
+#include "constants.h"
 #include <cmath>
 
 namespace sim
@@ -7,7 +8,6 @@ namespace sim
 namespace
 {
 
-const double TWO_PI = 6.283185307179586476925286766559;
 /* Share of a variance below which what is left of it is rounding. */
 const double NO_NOISE = 1e-13;
 

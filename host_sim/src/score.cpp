@@ -1,15 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 #include "score.h"
+#include "constants.h"
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace sim
 {
 namespace
 {
-
-const double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
 bool fails_test(const Verdict &verdict)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: MIT */
 #include "summary.h"
+#include "constants.h"
 #include "words.h"
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace sim
 {
@@ -11,7 +11,6 @@ namespace
 {
 
 const char *const PHASE_NAMES[PHASES] = {"before", "during", "after", "all"};
-const double      UNKNOWN             = std::numeric_limits<double>::quiet_NaN();
 
 /* Mean and its standard error over the runs in which the value is known. */
 struct Mean {
