@@ -64,7 +64,7 @@ class Bus:
               **options: str) -> subprocess.Popen:
         """A plant that writes to the folder of that name."""
         return self.start("plant", self.scenarios / scenario, "--out", self.out / f"{name}.plant",
-                          *arguments, **options)
+                          "--patience-ms", PATIENT_US // 1000, *arguments, **options)
 
     def results(self, name: str, *processes: subprocess.Popen) -> dict:
         """Wait for the processes; statuses, and the reports of node and plant."""
@@ -176,9 +176,9 @@ RECORDERS = {"can": ["candump", "-L", "-r", "8388608", "vcan0"],
 PLAYERS = {"can": ["canplayer", "vcan0=vcan0", "vcan0=can0", "-t", "-g", "1", "-I"],
            "lcm": ["lcm-logplayer", "--speed=SPEED", "--lcm-url=URL"]}
 #: The logger's socket holds a hundred steps, no more.
-PACES = {"can": (), "lcm": ("--pace-us", 5000)}
+PACES = {"can": (), "lcm": ("--pace-us", 20_000)}
 #: lcm-logplayer: a recorded run took its pace a step, an exported one takes the model's dt.
-SPEEDS = {"recorded": "1", "exported": "20"}
+SPEEDS = {"recorded": "4", "exported": "20"}
 
 
 def stock(bus: Bus, _: int) -> dict:
