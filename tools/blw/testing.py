@@ -105,7 +105,9 @@ def _on_target(name: str) -> Tally:
 
 def _pytest(suite: str) -> Tally:
     command = [sys.executable, "-m", "pytest", "--quiet", "-rs", "-n", str(os.cpu_count()),
-               "--dist", "loadgroup" if suite == "bus" else "load",  # a bus is set up once
+               # A bus is set up once.  Elsewhere a worker has files of its own, whose fixtures it
+               # makes once, until it runs out of them.
+               "--dist", "loadgroup" if suite == "bus" else "worksteal",
                str(ROOT / "tests" / suite)]
     return _with_junit(command, BUILD / f"{suite}.xml", "--junitxml")
 
