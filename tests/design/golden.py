@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Reference systems shared by the tests: golden files and small plants built here."""
 
-import json
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
+from shared_data import golden
 
 from blw import kalman, model
 from blw.kalman import Kalman
@@ -15,20 +13,11 @@ from blw.model import Model
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "host_sim/models"
-SHARED = Path(os.environ.get("BULWARK_SHARED", ROOT.parent / "shared"))
-
-
-def read(name: str) -> dict[str, Any]:
-    """A golden file; skips if it is missing."""
-    path = SHARED / "golden" / f"{name}.json"
-    if not path.is_file():
-        pytest.skip(f"no {path}: set BULWARK_SHARED")
-    return json.loads(path.read_text())
 
 
 def load(name: str) -> tuple[dict[str, Any], Model, Kalman]:
     """A golden file, its model, and the Kalman filter designed for it; skips if it is missing."""
-    data = read(name)
+    data = golden(name)
     plant = {key: data["model"][key] for key in ("A", "Bu", "B", "C", "Q", "R")}
     return data, *build(name, plant)
 

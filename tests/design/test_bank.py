@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_data
 from bank_library import BankLibrary, compile_library
 from c_library import DEGRADED, MISSING
-from golden import MODELS, read
+from golden import MODELS
 from scipy.signal import lfilter
 
 from blw import bank, bank_build
@@ -30,7 +31,7 @@ def libraries(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def reference():
-    return read("bank_drone5")
+    return shared_data.golden("bank_drone5")
 
 
 def named(name):

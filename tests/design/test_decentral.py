@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shared_data
 from c_library import BLIND, CONVERGED, DEGRADED, HELD, KALMAN, MISSING, WARMING_UP
 from decentral_library import Decentral, compile_library
 from decentral_reference import Reference, parse, random_plant, simulate
-from golden import MODELS, read
+from golden import MODELS
 from scipy import stats
 
 from blw import decentral, kalman, model
@@ -42,7 +43,7 @@ def reference_run(reference, y, u):
 
 @pytest.mark.parametrize("name", ["drone5", "torsion"])
 def test_run_given_golden_file_agrees_in_both_widths(libraries, name):
-    data = read(f"chi2_{name}")
+    data = shared_data.golden(f"chi2_{name}")
     plant, filtered = shipped(name)
     designed = decentral.design(plant, filtered, Options(false_alarm=data["delta"]))
     y, x, g = (np.array(data[key]) for key in ("y", "xhat", "g"))

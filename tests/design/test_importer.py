@@ -2,17 +2,16 @@
 """Import of identified models, their attacks and their log columns."""
 
 import json
-import os
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from shared_data import SHARED
 
 from blw import cli, importer, model
 
-ROOT = Path(__file__).resolve().parents[2]
-DATA = Path(os.environ.get("BULWARK_SHARED", ROOT.parent / "shared")) / "data"
+DATA = SHARED / "data"
 RECORDED = ["rav4_verifiedcan/model.json", "rav4_comma2k19/model.json", "css_obd_gnss/model.json",
             "quad_mimu/model_roll.json", "quad_mimu/model_pitch.json"]
 

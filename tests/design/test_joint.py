@@ -5,7 +5,8 @@ import dataclasses
 
 import numpy as np
 import pytest
-from golden import MODELS, read
+import shared_data
+from golden import MODELS
 
 from blw import joint, joint_analysis, kalman, options
 from blw import model as models
@@ -16,7 +17,7 @@ RELATIVE = 1e-9
 
 
 def golden():
-    data = read("fdi_ieee4")
+    data = shared_data.golden("fdi_ieee4")
     plant = {key: data["system"][key] for key in ("A", "C", "Q", "R", "P0")}
     made = models.parse({"name": "ieee4", "dt_s": 5.0, "plant": plant, "attack": {"p": 1}}, "ieee4")
     pairs = [Pair(one["weak"], tuple(one["strong"])) for one in data["locals"]]

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from shared_data import SHARED
 
 from blw.build import PRECISIONS, ROOT, simulator
 
@@ -52,10 +53,9 @@ def blw_sim(request: pytest.FixtureRequest) -> Run:
 @pytest.fixture(scope="session")
 def shared() -> Path:
     """Reference results and recorded logs; a test that wants them skips where they are missing."""
-    folder = Path(os.environ.get("BULWARK_SHARED", ROOT.parent / "shared"))
-    if not folder.is_dir():
-        pytest.skip(f"no {folder}: set BULWARK_SHARED")
-    return folder
+    if not SHARED.is_dir():
+        pytest.skip(f"no {SHARED}: set BULWARK_SHARED")
+    return SHARED
 
 
 @pytest.fixture

@@ -6,28 +6,15 @@ one row later and has a first row for the initial state.
 """
 
 import csv
-import json
-import os
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
-from blw.build import ROOT, simulator
+from blw.build import simulator
 from blw.design import Design, document, json_text
 from blw.model import Model, parse
-
-SHARED = Path(os.environ.get("BULWARK_SHARED", ROOT.parent / "shared"))
-
-
-def load(name: str) -> dict[str, Any]:
-    """A golden file; skips if it is missing."""
-    path = SHARED / "golden" / f"{name}.json"
-    if not path.is_file():
-        pytest.skip(f"no {path}: set BULWARK_SHARED")
-    return json.loads(path.read_text())
 
 
 def build(golden: dict[str, Any], method: str, options: dict[str, Any]) -> Model:

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shared_data
 from conftest import Run
-from golden_case import build, estimates, load, replay
+from golden_case import build, estimates, replay
 from sim_case import design_text, summary
 
 from blw import canonical, kalman
@@ -54,7 +55,7 @@ def design(golden: dict, gamma: str) -> tuple[Design, np.ndarray, np.ndarray]:
 def test_replay_given_golden_measurements_reproduces_reference(
     tmp_path: Path, name: str, gamma: str, precision: str
 ) -> None:
-    golden = load(name)
+    golden = shared_data.golden(name)
     whole, *_ = design(golden, gamma)
     rows = replay(tmp_path, golden, whole, precision, "canonical")
     reference = golden["canonical"]["gamma"][gamma]
@@ -67,7 +68,7 @@ def test_replay_given_golden_measurements_reproduces_reference(
 
 @pytest.mark.parametrize("name", ["paper1", "jordanA"])
 def test_transforms_given_golden_model_differ_by_a_rotation_of_noise_rows(name: str) -> None:
-    golden = load(name)
+    golden = shared_data.golden(name)
     _, reference, ours = design(golden, "1")
     H = np.array(golden["canonical"]["H"]).reshape(reference.shape)
     for P_ref, P_our, H_i in zip(reference, ours, H):

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from golden_case import build, estimates, load, replay
+import shared_data
+from golden_case import build, estimates, replay
 
 from blw.design import design_all
 from blw.model import Model
@@ -24,20 +25,20 @@ TOLERANCE = {"f64": 1e-6, "f32": 1e-3}
 def test_active_set_reproduces_reference(
     tmp_path: Path, name: str, gamma: str, precision: str
 ) -> None:
-    golden = load(name)
+    golden = shared_data.golden(name)
     model = build(golden, "lasso", {"gamma": float(gamma)})
     check(golden, replayed(tmp_path, golden, model, precision), gamma, TOLERANCE[precision])
 
 
 @pytest.mark.parametrize(("name", "gamma"), [("paper1", "30"), ("complex", "3")])
 def test_admm_reproduces_reference(tmp_path: Path, name: str, gamma: str) -> None:
-    golden = load(name)
+    golden = shared_data.golden(name)
     model = build(golden, "lasso", {"gamma": float(gamma), "engine": "admm", "tolerance": 1e-3})
     check(golden, replayed(tmp_path, golden, model, "f64"), gamma, TOLERANCE["f64"])
 
 
 def test_kalman_reproduces_reference(tmp_path: Path) -> None:
-    golden = load("paper0")
+    golden = shared_data.golden("paper0")
     rows = replayed(tmp_path, golden, build(golden, "lasso", {"gamma": 1.0}), "f64", "kalman")
     assert np.abs(estimates(golden, rows) - golden["x_kalman"]).max() < 1e-12
 

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from golden_case import build, estimates, load, replay
+import shared_data
+from golden_case import build, estimates, replay
 
 from blw.design import design_all
 
@@ -17,7 +18,7 @@ TOLERANCE = {"f64": 1e-8, "f32": 1e-3}
 @pytest.mark.parametrize("precision", ["f64", "f32"])
 @pytest.mark.parametrize(("name", "k"), CASES)
 def test_guard_reproduces_reference(tmp_path: Path, name: str, k: str, precision: str) -> None:
-    golden = load(name)
+    golden = shared_data.golden(name)
     reference = golden["glr"]["k"][k]
     model = build(golden, "guard", {"k": float(k), "exclude": reference["tau_hi"]})
     designed = design_all(model, ["kalman", "guard"])
