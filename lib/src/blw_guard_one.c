@@ -81,6 +81,12 @@ static bool descend(blw_guard_t *self, descent_t *descent, unsigned limit, bool 
         const bool still = descent->view.largest <= (GUARD_TOLERANCE * self->model->k);
 
         if (still && descent->gross) {
+            const unsigned product = self->model->head.plant->m; /* in block columns of S */
+
+            if ((self->updates + product) > limit) {
+                return false;
+            }
+            self->updates = (uint16_t)(self->updates + product);
             blw_guard_multipliers(self->model, self->eta, self->l);
             blw_guard_survey(self, &descent->view);
             descent->gross = false;

@@ -47,7 +47,7 @@ DRIFT_SIGMAS = 5.0
 #: work beside them weighs less; where several sensors are excluded jointly without tables; and
 #: where more than RARE_CLIPPING of the benign steps need some.
 UPDATES = 7
-UPDATE_TERMS = 60
+UPDATE_TERMS = 80
 MOST_UPDATES = 16
 UPDATES_IF_JOINT = 30
 UPDATES_IF_OFTEN = 200
