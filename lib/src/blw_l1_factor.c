@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Factor of the systems of blw_l1_kkt.c and blw_l1_newton_step.c: a symmetric matrix, packed lower,
- * becomes L J L' in place, J = diag(I, -I) with the first I of order f.  Two rows and two columns at a
- * time, so that every number is loaded for two products; all sums run in index order. */
+ * becomes L J L' in place, J = diag(I, -I) with the first I of order f.  Two rows and two columns
+ * at a time, so that every number is loaded for two products; all sums run in index order. */
 #include "blw_l1_internal.h"
 
 /* Least pivot of L: rows of W have about unit variance or more. */
@@ -56,7 +56,8 @@ static void reduce_two_rows(size_t count, const blw_real_t *L, blw_real_t *A, bl
     }
 }
 
-/* Pivot of row r, the columns before it done.  @return whether it is below a share of its diagonal. */
+/* Pivot of row r, the columns before it done.  @return whether it is below a share of its
+ * diagonal. */
 static bool finish_row(size_t r, blw_real_t share, blw_real_t *Lr)
 {
     const blw_real_t least  = blw_la_max(share * Lr[r], PIVOT_MIN * PIVOT_MIN);

@@ -134,8 +134,8 @@ void blw_l1_imbalance(const blw_l1_model_t *m, const blw_real_t *l, blw_real_t *
 void blw_l1_predict(const blw_l1_model_t *m, const blw_real_t *l, const blw_real_t *x,
                     blw_real_t *tau);
 
-/* In self->L [size x size], packed lower: [W_ff G_f; G_f' 0] or the like, f rows and then the columns
- * of G, becomes its factor L J L', J = diag(I, -I).
+/* In self->L [size x size], packed lower: [W_ff G_f; G_f' 0] or the like, f rows and then the
+ * columns of G, becomes its factor L J L', J = diag(I, -I).
  * @return whether the square of one of the first f pivots is below a share of the diagonal. */
 bool blw_l1_factor(blw_l1_t *self, size_t f, size_t size, blw_real_t share);
 /* self->step [size] = (L J L')^-1 self->step. */

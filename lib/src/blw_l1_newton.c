@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: MIT */
-/* Newton engine for (2) in blw_l1.h, groups of one row or two.  A group is either inside, nu_g = 0, or
- * outside, l_g = c_g nu_g / |nu_g|, where only a pair can still turn.  A Newton step solves the
- * optimality conditions for the present groups inside and outside (blw_l1_newton_step.c); few rows are
- * inside in the end, often hardly more than n, so that a step is cheap.  The sides come from passes of
- * alternating directions (blw_l1_newton_start.c); mostly a few steps correct them until x stands,
- * verified by (4).  Where they do not, continuation [Madsen, Nielsen, "A finite smoothing algorithm for
- * linear l1 estimation", SIAM J. Optimization 3 (1993)]: |nu_g| is rounded off below
+/* Newton engine for (2) in blw_l1.h, groups of one row or two.  A group is either inside, nu_g = 0,
+ * or outside, l_g = c_g nu_g / |nu_g|, where only a pair can still turn.  A Newton step solves the
+ * optimality conditions for the present groups inside and outside (blw_l1_newton_step.c); few rows
+ * are inside in the end, often hardly more than n, so that a step is cheap.  The sides come from
+ * passes of alternating directions (blw_l1_newton_start.c); mostly a few steps correct them until x
+ * stands, verified by (4).  Where they do not, continuation [Madsen, Nielsen, "A finite smoothing
+ * algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)]: |nu_g| is rounded off below
  * w = kappa width_g, width_g = the benign standard deviation of zeta_g,
  *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|,                                (1)
  * which makes the objective smooth, l_g = c_g nu_g / max(|nu_g|, w), inside where that is linear; a
- * search along each step keeps the objective falling.  Once that has settled, kappa falls by a fixed
- * ratio, and where no group has changed sides for one kappa, kappa = 0 is tried again. */
+ * search along each step keeps the objective falling.  Once that has settled, kappa falls by a
+ * fixed ratio, and where no group has changed sides for one kappa, kappa = 0 is tried again. */
 #include "blw_l1_newton.h"
 #include "blw_cold.h"
 

@@ -32,7 +32,8 @@ blw_real_t blw_l1_newton_residual(const blw_l1_newton_t *at);
  * the first n numbers of self->step = change of x. */
 void blw_l1_newton_step(blw_l1_newton_t *at);
 
-/* The first tau, l, x and sides, widths to A, and kappa; from l = S zeta and what was remembered. */
+/* The first tau, l, x and sides, widths to A, and kappa; from l = S zeta and what was
+ * remembered. */
 void blw_l1_newton_start(blw_l1_newton_t *at);
 
 /* |nu_g| of the groups under a gross attack to A, 0 for the others; dir holds the directions. */

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: MIT */
-/* Where the Newton steps of blw_l1_newton.c start.  With the smoothing of (1) there, kappa = rho of the
- * model, and every group inside, the minimum is linear in zeta,
+/* Where the Newton steps of blw_l1_newton.c start.  With the smoothing of (1) there, kappa = rho of
+ * the model, and every group inside, the minimum is linear in zeta,
  *     l = M zeta,   nu = D l,   D = rho width_g / c_g,
  *     M = K - K G (G' K G)^-1 G' K,   K = (W + D)^-1,                                          (1)
- * and so alternating directions [Boyd et al., "Distributed Optimization and Statistical Learning via
- * ADMM", section 3.1.1] in the metric of D need one product with M per pass, with t for nu and the
- * scaled dual u:
+ * and so alternating directions [Boyd et al., "Distributed Optimization and Statistical Learning
+ * via ADMM", section 3.1.1] in the metric of D need one product with M per pass, with t for nu and
+ * the scaled dual u:
  *     l = M (zeta - t + u),   nu = t - u + D l,
  *     t = shrink(q, rho width_g),   q = alpha nu + (1 - alpha) t + u,   u = q - t.             (2)
- * A few passes, each a tenth of a Newton step, find most sides.  Noise is fresh in every sample: only
- * what a gross attack has clipped is taken over from the last solve. */
+ * A few passes, each a sixth of a Newton step, find most sides.  Noise is fresh in every sample:
+ * only what a gross attack has clipped is taken over from the last solve. */
 #include "blw_l1_newton.h"
 
 #define PASSES     20U

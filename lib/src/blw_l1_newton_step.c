@@ -2,11 +2,11 @@
 /* The linear system of blw_l1_newton.c.  Unknown are l on the groups inside, one number t per pair
  * outside, which turns it, l_g = c_g dir_g + t p_g, p_g = dir_g turned by 90 degrees, and x:
  *     [ E' W E + D   E' G ] [ l_E ]   [ E' (zeta - W l_0) ]
- *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],  l = l_0 + E l_E,  tau = W l + G x. (1)
- * D = kappa width_g / c_g inside, |nu_g| / c_g for a pair outside; l_0 = c dir outside.  The system
- * is solved for the change from the present point, so that rounding errors do not stay.  R, a small
- * part of the information on x, holds x where E' G leaves it open; it only damps the change.
- * The matrix is factored by blw_l1_factor.c. */
+ *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],                                   (1)
+ * l = l_0 + E l_E, tau = W l + G x.  D = kappa width_g / c_g inside, |nu_g| / c_g for a pair
+ * outside; l_0 = c dir outside.  The system is solved for the change from the present point, so that
+ * rounding errors do not stay.  R, a small part of the information on x, holds x where E' G leaves
+ * it open; it only damps the change.  The matrix is factored by blw_l1_factor.c. */
 #include "blw_cold.h"
 #include "blw_l1_newton.h"
 
@@ -17,8 +17,8 @@
  * numbers can tell. */
 #define PIVOT2_MIN (BLW_R(16.0) * BLW_REAL_EPS)
 
-/* The columns of E to self->dz: row i of the problem, or, below 0, the pair of rows i and i + 1 turned
- * by 90 degrees as -1 - i.  Small integers, exact in blw_real_t.  @return their number. */
+/* The columns of E to self->dz: row i of the problem, or, below 0, the pair of rows i and i + 1
+ * turned by 90 degrees as -1 - i.  Small integers, exact in blw_real_t.  @return their number. */
 static size_t list_columns(blw_l1_t *self)
 {
     const blw_l1_model_t *const m = self->model;
