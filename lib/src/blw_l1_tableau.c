@@ -10,16 +10,13 @@
  *     A row i with |l_i| > c_i enters: nu_i moves by t, and, l_A being held at c_A s_A,
  *     nu_A -= t T_Ai,   l_f -= t T_fi,   until |l_i| = c_i.                                  (2)
  * A nu_j that turns round on the way leaves next, by (2) with t = nu_j / T_jj.  That takes no more
- * sweeps than to stop where nu_j vanishes, and less work, but nothing says that it ends: after BOLD
- * sweeps per row, or where T_ii = 0, (2) stops there and j leaves first; the objective then never
- * rises.  The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is refined and verified
- * in W and G (blw_l1_refine.c), or solved there anew where T is too coarse. */
+ * sweeps than to stop where nu_j vanishes, and less work, but nothing says that it ends: after N
+ * sweeps, or where T_ii = 0, (2) stops there and j leaves first; the objective then never rises.
+ * The row that enters gains most: (|l_i| - c_i)^2 / T_ii.  The end is refined and verified in W and
+ * G (blw_l1_refine.c), or solved there anew where T is too coarse. */
 #include "blw/blw_l1_survey.h"
 #include "blw_cold.h"
 #include "blw_l1_internal.h"
-
-/* Sweeps per row with which rows enter whole. */
-#define BOLD 2U
 
 /* Column k of T, whole. */
 static void column(const blw_l1_t *self, size_t k, blw_real_t *col)
@@ -230,7 +227,7 @@ static BLW_APART void pivot(blw_l1_t *self, blw_l1_info_t *info)
         column(self, i, self->step);
         if (blw_l1_clipped(self, i)) {
             leave(self, i, &seen);
-        } else if ((self->step[i] > BLW_L1_PIVOT_MIN) && (info->iterations < (BOLD * m->N))) {
+        } else if ((self->step[i] > BLW_L1_PIVOT_MIN) && (info->iterations < m->N)) {
             enter(self, i, s, &seen);
         } else {
             sweeps    = exchange(self, i, s, (unsigned)m->max_iterations - info->iterations, &seen);
