@@ -12,15 +12,15 @@
 #define ALONE  3U
 #define BESIDE 4U
 
-typedef struct descent {
+typedef struct one_descent {
     blw_guard_view_t view;
     blw_real_t       clear;    /* by how much the largest |h_i| is above all others, and exclude */
     size_t           leader;   /* whose it is */
     size_t           excluded; /* if self->excluded is not 0 */
     bool             gross;    /* l may hold the rounding of a gross attack */
-} descent_t;
+} one_descent_t;
 
-static void find_leader(const blw_guard_t *self, descent_t *descent)
+static void find_leader(const blw_guard_t *self, one_descent_t *descent)
 {
     blw_real_t most   = BLW_R(0.0);
     blw_real_t second = self->model->exclude;
@@ -40,7 +40,7 @@ static void find_leader(const blw_guard_t *self, descent_t *descent)
 }
 
 /* l_i = 0 from now on.  @return false with nothing changed if the limit does not allow that. */
-static bool exclude(blw_guard_t *self, descent_t *descent, size_t i)
+static bool exclude(blw_guard_t *self, one_descent_t *descent, size_t i)
 {
     if ((self->updates + ALONE) > self->model->max_updates) {
         return false;
@@ -54,12 +54,15 @@ static bool exclude(blw_guard_t *self, descent_t *descent, size_t i)
 }
 
 /* Take the largest step.  @return false if the limit does not allow that. */
-static bool update(blw_guard_t *self, descent_t *descent, unsigned limit)
+static bool update(blw_guard_t *self, one_descent_t *descent, unsigned limit)
 {
-    const size_t   i      = descent->view.sensor;
-    const bool     alone  = (self->excluded == 0U) || (i == descent->excluded);
-    const unsigned needed = alone ? ALONE : BESIDE;
+    const size_t i      = descent->view.sensor;
+    const bool   alone  = (self->excluded == 0U) || (i == descent->excluded);
+    unsigned     needed = BESIDE;
 
+    if (alone) {
+        needed = ALONE;
+    }
     if ((self->updates + needed) > limit) {
         return false;
     }
@@ -75,7 +78,7 @@ static bool update(blw_guard_t *self, descent_t *descent, unsigned limit)
 
 /* Descend until nothing moves, who lies is clear if that is asked for, or the limit is reached.
  * @return whether nothing moves. */
-static bool descend(blw_guard_t *self, descent_t *descent, unsigned limit, bool decides)
+static bool descend(blw_guard_t *self, one_descent_t *descent, unsigned limit, bool decides)
 {
     for (;;) {
         const bool still = descent->view.largest <= (GUARD_TOLERANCE * self->model->k);
@@ -103,7 +106,7 @@ static bool descend(blw_guard_t *self, descent_t *descent, unsigned limit, bool 
 }
 
 /* Exclude who stands out, and see whether it still does.  @return that; if not, nothing is excluded. */
-static bool exclude_at_once(blw_guard_t *self, descent_t *descent)
+static bool exclude_at_once(blw_guard_t *self, one_descent_t *descent)
 {
     const blw_real_t margin = GUARD_AT_ONCE * self->model->k;
 
@@ -124,7 +127,7 @@ static blw_real_t solve(blw_guard_t *self, bool *converged)
 {
     const unsigned most    = self->model->max_updates;
     const bool     decides = self->warm_up == 0U;
-    descent_t      descent = {.gross = blw_guard_begin(self)};
+    one_descent_t  descent = {.gross = blw_guard_begin(self)};
 
     if (!decides || !exclude_at_once(self, &descent)) {
         blw_guard_survey(self, &descent.view);
