@@ -4,8 +4,8 @@
  *     [ E' W E + D   E' G ] [ l_E ]   [ E' (zeta - W l_0) ]
  *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],                                   (1)
  * l = l_0 + E l_E, tau = W l + G x.  D = kappa width_g / c_g inside, |nu_g| / c_g for a pair
- * outside; l_0 = c dir outside.  The system is solved for the change from the present point, so that
- * rounding errors do not stay.  R, a small part of the information on x, holds x where E' G leaves
+ * outside; l_0 = c dir outside.  The system is solved for the change from the present point, so
+ * that rounding errors do not stay.  R, a small part of the information on x, holds x where E' G leaves
  * it open; it only damps the change.  The matrix is factored by blw_l1_factor.c. */
 #include "blw_cold.h"
 #include "blw_l1_newton.h"
