@@ -23,7 +23,7 @@ static uint32_t checksum(blw_kalman_model_t model)
 int main(void)
 {
     blw_kalman_model_t model = {
-        {BLW_MODEL_ABI, (uint8_t)BLW_METHOD_KALMAN, 0U, &plant}, half, NULL};
+        {BLW_MODEL_ABI, (uint8_t)BLW_METHOD_KALMAN, 0U, &plant}, half, NULL, NULL, NULL};
     blw_real_t          mem[BLW_KALMAN_MEM(1, 1)];
     blw_kalman_t        filter;
     blw_estimator_out_t out;
