@@ -4,9 +4,9 @@
  *  The plant sends sync, inputs and measurements of one step after the other, and waits for the
  *  answer of a node that has its model (or does not wait: pace_us).  A node process holds one node
  *  per method, all on the bus; the speaker alone sends.  In a split deployment one process per
- *  sensor runs the local filter, and a fusion node takes what they send.  The attacker is either a gateway, between
- *  the sensors' link and the node's, that changes, withholds and delays what it holds; or an
- *  intruder on the node's link, that sends frames with its victims' identifiers.
+ *  sensor runs the local filter, and a fusion node takes what they send.  The attacker is either a
+ *  gateway, between the sensors' link and the node's, that changes, withholds and delays what it
+ *  holds; or an intruder on the node's link, that sends frames with its victims' identifiers.
  *
  *  Each prints one line "listening on ..." when it is on the bus, and a report when it ends.
  */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: MIT */
 /** @file comparison.h  The filters that [J] compares `joint` with, for figures only.
  *
- *  Three use the sensors of joint's first pair and the state X = [x; theta], theta the signal on the
- *  weak sensor, phi(k) = theta(k) - theta(k-1):
+ *  Three use the sensors of joint's first pair and the state X = [x; theta], theta the signal on
+ *  the weak sensor, phi(k) = theta(k) - theta(k-1):
  *    augmented        Kalman filter with phi as white noise of the variance 2 eta (Remark 3)
  *    augmented_blind  the same with the variance 0: nothing is known about the attack
  *    adaptive         phi as an unknown constant: Q. Zhang, "Adaptive Kalman filter for actuator

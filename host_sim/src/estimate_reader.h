@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/** @file estimate_reader.h  Estimates as they come over a bus: frames, then a status that seals them.
+/** @file estimate_reader.h  Estimates as they come over a bus: frames, then a status that seals
+ *  them.
  */
 #ifndef BLW_SIM_ESTIMATE_READER_H
 #define BLW_SIM_ESTIMATE_READER_H

@@ -5,7 +5,8 @@
  *  each with the phases before, during, after, all (null where a phase is empty or, for one run,
  *  no standard error exists); detection_delay_steps and _s of the attacks that were detected,
  *  false_alarm_rate outside attacks, missed and wrong exclusions, kalman_rate, outcomes, flags,
- *  iterations, and the verdict that the design gave on the method, if any.  Means are over runs, rates over the steps of all runs.
+ *  iterations, and the verdict that the design gave on the method, if any.  Means are over runs,
+ *  rates over the steps of all runs.
  */
 #ifndef BLW_SIM_SUMMARY_H
 #define BLW_SIM_SUMMARY_H

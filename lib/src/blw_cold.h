@@ -5,8 +5,8 @@
  *  optimisation the user's build has: checks and init would otherwise be the larger half of the
  *  flash.  It is for what runs once, or only passes a call on.
  *
- *  BLW_APART keeps a function out of its caller, whose frame lies on the stack while deeper functions
- *  run: what one part of a step needs for itself is then not there during the others.
+ *  BLW_APART keeps a function out of its caller, whose frame lies on the stack while deeper
+ *  functions run: what one part of a step needs for itself is then not there during the others.
  *
  *  What they mark computes the same, so a compiler that does not know them loses nothing else.
  */

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* One sensor alone.
  *
- * Since S_ii = diag(I, 0), the minimum of (2) over nu_i alone is (3), and with s = min(1, k_i / |h_i|) it
- * moves tau_i, and l_i, by
+ * Since S_ii = diag(I, 0), the minimum of (2) over nu_i alone is (3), and with
+ * s = min(1, k_i / |h_i|) it moves tau_i, and l_i, by
  *     step = s h_i - l_i.                                                                    (7)
  * tau is kept rather than nu: it stays at noise size however large the attack, and a sensor that
- * leaves the support gets tau_i = e_i exactly.  Where tau_i starts makes no difference to the minimum:
- * after a gross attack it starts from 0, and l = S tau holds no rounding of what was sent. */
+ * leaves the support gets tau_i = e_i exactly.  Where tau_i starts makes no difference to the
+ * minimum: after a gross attack it starts from 0, and l = S tau holds no rounding of what was
+ * sent. */
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 

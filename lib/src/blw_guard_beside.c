@@ -2,8 +2,8 @@
 /* One sensor beside the excluded one, both at once.
  *
  * With sensor j excluded, l_j = 0 and S_jj = diag(I, 0), nu_j can be eliminated: what is left for
- * sensor i has S_ii - S_ij S_ji = V' diag(s) V in the place of S_ii.  In the coordinates V nu_i, with
- * g = V l_i + s V nu_i,
+ * sensor i has S_ii - S_ij S_ji = V' diag(s) V in the place of S_ii.  In the coordinates V nu_i,
+ * with g = V l_i + s V nu_i,
  *     nu_c = g_c / (s_c + mu),   mu |nu| = k,   or nu = 0 if |g| <= k.                       (10)
  * psi(mu) = 1 / |nu| - mu / k is concave, s <= 1, so Newton's method on it decreases monotonically
  * from mu = k / (|g| - k) to the root, two or three steps as a rule. */

@@ -3,7 +3,8 @@
  *
  * With |t l_i| <= k, t = min(1, min k / |l_i|), the duality gap of (2) is
  *     gap = (1 - t)^2 l' S^+ l / 2 + sum_i (k |nu_i| - t l_i' nu_i),                         (8)
- * the minimiser is within |nu - nu*|_S^2 <= 2 gap, and with Gu x + W z = nu - nu*, x = Fu (nu - nu*):
+ * the minimiser is within |nu - nu*|_S^2 <= 2 gap, and with Gu x + W z = nu - nu*,
+ * x = Fu (nu - nu*):
  *     |x_hat - x*| <= kappa (2 f / k + omega (2 gap)^(1/2)) + sigma (2 gap)^(1/2),           (9)
  * because sum_i k |nu_i| and sum_i k |nu_i*| are both at most the objective f. */
 #include "blw_cold.h"

@@ -75,8 +75,8 @@ void blw_guard_advance(blw_guard_t *self, const blw_real_t *y, blw_mask_t used);
 /** Check every table and dimension. */
 blw_status_t blw_guard_check(const blw_guard_model_t *model);
 
-/** The sensors whose filters a gross attack has reached; none if they are so many that it may be the
- *  reference that is off.  Overwrites suspicion. */
+/** The sensors whose filters a gross attack has reached; none if they are so many that it may be
+ *  the reference that is off.  Overwrites suspicion. */
 blw_mask_t blw_guard_gross(blw_guard_t *self);
 /** tau = e, but 0 for the sensors of a set, l = S tau, and nu_i /= 0 for that set. */
 void blw_guard_start_without(blw_guard_t *self, blw_mask_t set);
@@ -105,8 +105,8 @@ void blw_guard_move_beside(blw_guard_t *self, size_t i, size_t j);
 /** (9) of blw_guard_bound.c from e, tau and l with l' S^+ l = l' tau, and the largest |l_i|;
  *  BLW_REAL_MAX if the model has no kappa. */
 blw_real_t blw_guard_bound(const blw_guard_t *self, blw_real_t largest);
-/** Whether changes of |h_i| by `margin` would leave the sensors of a set above all others, and above
- *  the threshold. */
+/** Whether changes of |h_i| by `margin` would leave the sensors of a set above all others, and
+ *  above the threshold. */
 bool blw_guard_stands_out(const blw_guard_t *self, blw_mask_t set, blw_real_t margin);
 /** The p units with the largest |h_i| above the threshold, as sensors; *clear: these are p, and
  *  stand out by `margin`. */
@@ -123,14 +123,15 @@ void blw_guard_factor(const blw_guard_t *self, size_t rows);
 blw_real_t blw_guard_reduce(const blw_guard_t *self, size_t rows, blw_real_t *x);
 /** x = L'^-1 x */
 void blw_guard_expand(const blw_guard_t *self, size_t rows, blw_real_t *x);
-/** One Newton step of (2) on the sensors of the set, at most model->most.  @return false with nothing
- *  changed if an attack would change sides, where the model of second order is of no use. */
+/** One Newton step of (2) on the sensors of the set, at most model->most.  @return false with
+ *  nothing changed if an attack would change sides, where the model of second order is of no
+ *  use. */
 bool blw_guard_newton(blw_guard_t *self, blw_mask_t set);
 /** List a set of sensors, the excluded ones last.  @return false if they are too many. */
 bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some);
-/** Minimise (2) over the nu of the sensors in the list.  That counts as one update each for the sums of
- *  their steps, and one for each step but that of a sensor alone.  @return false with nothing
- *  changed if the list is empty or that is more than the limit allows. */
+/** Minimise (2) over the nu of the sensors in the list.  That counts as one update each for the
+ *  sums of their steps, and one for each step but that of a sensor alone.  @return false with
+ *  nothing changed if the list is empty or that is more than the limit allows. */
 bool blw_guard_move_some(blw_guard_t *self, blw_guard_some_t *some, blw_real_t tolerance,
                          unsigned limit);
 /** Move the sensors of a set so, or else, if they are too many or do not move, those of a smaller
@@ -139,7 +140,8 @@ void blw_guard_move_together(blw_guard_t *self, blw_mask_t set, blw_mask_t small
                              blw_real_t close, unsigned limit);
 /** The sensors without nu_i that clip; suspicion is filled with all |l_i|^2. */
 blw_mask_t blw_guard_clipping(blw_guard_t *self);
-/** y = (S_ii - S_ij S_ji)^-1 x, 0 where nothing but i and j can check; turned [r] is overwritten. */
+/** y = (S_ii - S_ij S_ji)^-1 x, 0 where nothing but i and j can check; turned [r] is
+ *  overwritten. */
 void blw_guard_divide(const blw_guard_model_t *model, size_t i, size_t j, const blw_real_t *x,
                       blw_real_t *turned, blw_real_t *y);
 

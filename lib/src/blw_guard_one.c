@@ -2,9 +2,9 @@
 /* One liar at most, and the tables to solve for any sensor beside it exactly: one sensor after the
  * other.
  *
- * The sensor with the largest |h_i| is excluded at once if it stands out, before and after; otherwise
- * sensors take their steps (7) until it is clear which one to exclude, if any.  Then whatever still
- * has the largest step takes (10). */
+ * The sensor with the largest |h_i| is excluded at once if it stands out, before and after;
+ * otherwise sensors take their steps (7) until it is clear which one to exclude, if any.  Then
+ * whatever still has the largest step takes (10). */
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -105,7 +105,8 @@ static bool descend(blw_guard_t *self, one_descent_t *descent, unsigned limit, b
     }
 }
 
-/* Exclude who stands out, and see whether it still does.  @return that; if not, nothing is excluded. */
+/* Exclude who stands out, and see whether it still does.  @return that; if not, nothing is
+ * excluded. */
 static bool exclude_at_once(blw_guard_t *self, one_descent_t *descent)
 {
     const blw_real_t margin = GUARD_AT_ONCE * self->model->k;

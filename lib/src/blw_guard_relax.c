@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: MIT */
 /* Descent among a few sensors.
  *
- * The minimum of (2) over the nu of some sensors needs no l but theirs, and no blocks of S but those
- * between them.  So the steps (7) are taken on copies of their l and tau, and only the sums of the
- * steps go to the other sensors.  An excluded sensor i has k_i = 0 and takes the step that makes
- * l_i = 0 after those of the others.  With pairs, one sensor beside an excluded one needs a single step
- * (blw_guard_beside.c), and two excluded ones are eliminated at once: with
+ * The minimum of (2) over the nu of some sensors needs no l but theirs, and no blocks of S but
+ * those between them.  So the steps (7) are taken on copies of their l and tau, and only the sums
+ * of the steps go to the other sensors.  An excluded sensor i has k_i = 0 and takes the step that
+ * makes l_i = 0 after those of the others.  With pairs, one sensor beside an excluded one needs a
+ * single step (blw_guard_beside.c), and two excluded ones are eliminated at once: with
  * S_ii - S_ij S_ji = V' diag(s) V,
- *     step_i = -V' diag(s)^-1 V (l_i - S_ij l_j),   step_j = -l_j - S_ji step_i.             (11) */
+ *     step_i = -V' diag(s)^-1 V (l_i - S_ij l_j),   step_j = -l_j - S_ji step_i.     (11) */
 #include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"

@@ -5,12 +5,12 @@
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
-/* While it is only to be decided which units to exclude, the steps of the sensors that move together
- * end at this part of the largest one. */
+/* While it is only to be decided which units to exclude, the steps of the sensors that move
+ * together end at this part of the largest one. */
 #define COARSE BLW_R(0.01)
 
-/* Sensors may come up again so many times before Newton steps are tried, in sweeps over several at a
- * time. */
+/* Sensors may come up again so many times before Newton steps are tried, in sweeps over several at
+ * a time. */
 #define PATIENCE 1U
 
 /* Updates that looking at all sensors counts as, wherever that leads. */
@@ -217,8 +217,8 @@ static BLW_COLD bool descend_without(blw_guard_t *self, blw_mask_t set, unsigned
     return converged;
 }
 
-/* Exclude what stands out, and see whether it still does; else leave the choice to the first descent,
- * which may start from anywhere. */
+/* Exclude what stands out, and see whether it still does; else leave the choice to the first
+ * descent, which may start from anywhere. */
 static BLW_COLD BLW_APART void exclude_at_once(blw_guard_t *self, unsigned limit,
                                                descent_t *descent)
 {

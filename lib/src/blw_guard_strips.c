@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* The width of a strip is a constant wherever the inner functions are used, so that the compiler keeps
- * the sums in registers; that is why they are inline. */
+/* The width of a strip is a constant wherever the inner functions are used, so that the compiler
+ * keeps the sums in registers; that is why they are inline. */
 #include "blw_guard_strips.h"
 
 /* Rows of two strips. */

@@ -5,8 +5,8 @@
  *     [ G' E         -R   ] [ x   ] = [ -G' l_0           ],                                   (1)
  * l = l_0 + E l_E, tau = W l + G x.  D = kappa width_g / c_g inside, |nu_g| / c_g for a pair
  * outside; l_0 = c dir outside.  The system is solved for the change from the present point, so
- * that rounding errors do not stay.  R, a small part of the information on x, holds x where E' G leaves
- * it open; it only damps the change.  The matrix is factored by blw_l1_factor.c. */
+ * that rounding errors do not stay.  R, a small part of the information on x, holds x where E' G
+ * leaves it open; it only damps the change.  The matrix is factored by blw_l1_factor.c. */
 #include "blw_cold.h"
 #include "blw_l1_newton.h"
 
@@ -28,9 +28,10 @@ static size_t list_columns(blw_l1_t *self)
         const size_t i    = m->first[g];
         const bool   pair = (blw_l1_size(m, g) == 2U);
         if (!blw_l1_outside(self, g, i)) {
-            self->dz[q]                    = (blw_real_t)i;
-            self->dz[q + (pair ? 1U : 0U)] = (blw_real_t)(i + (pair ? 1U : 0U));
-            q += pair ? 2U : 1U;
+            for (size_t row = i; row < m->first[g + 1U]; row++) {
+                self->dz[q] = (blw_real_t)row;
+                q++;
+            }
         } else if (pair) {
             self->dz[q] = BLW_R(-1.0) - (blw_real_t)i;
             q++;

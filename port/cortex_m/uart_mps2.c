@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* UART 0 and timer 0 of the MPS2 boards (CMSDK), both at 25 MHz.  The receiver holds one byte, so on
- * hardware an interrupt has to collect the bytes; QEMU waits until the byte has been taken. */
+/* UART 0 and timer 0 of the MPS2 boards (CMSDK), both at 25 MHz.  The receiver holds one byte, so
+ * on hardware an interrupt has to collect the bytes; QEMU waits until the byte has been taken. */
 #include "uart.h"
 
 #define UART_DATA    (*(volatile uint32_t *)0x40004000U)

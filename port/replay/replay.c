@@ -2,7 +2,8 @@
 /* replay LOG OUT: every step of a log through one estimator; all it says and what it took.
  *
  * LOG: per step u [l] and y [m] as blw_real_t and the mask of valid samples, 8 bytes.
- * OUT: once the ticks of an empty step, 4 bytes; then per step, packed, in the machine's byte order:
+ * OUT: once the ticks of an empty step, 4 bytes; then per step, packed, in the machine's byte
+ * order:
  *   ticks (4), status (4), x_hat [n], suspicion [m], statistic, threshold, bound as blw_real_t,
  *   excluded (8), used (8), iterations (2), outcome (1), flags (1).
  * The status is that of the library, so a refused step shows.  Exit status 0: all steps replayed;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: MIT */
-/** @file host_io.h  Files, console and exit of a test program: on a target by semihosting through the
- *  debugger or QEMU, on a host by its C library.  Not for firmware in the field.
+/** @file host_io.h  Files, console and exit of a test program: on a target by semihosting through
+ *  the debugger or QEMU, on a host by its C library.  Not for firmware in the field.
  *
- *  A target's program starts with main(argument count and vector as ever); it ends when main returns.
+ *  A target's program starts with main(argument count and vector as ever); it ends when main
+ *  returns.
  */
 #ifndef HOST_IO_H
 #define HOST_IO_H

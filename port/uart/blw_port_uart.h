@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
 /** @file blw_port_uart.h  Frames as SLCAN text on a microcontroller's serial line.
  *
- *  Polled: recv() takes the bytes that the line has and hands over those that wait to be sent, so it
- *  has to be called at least once per byte time, or the board's uart_get() has to read from a buffer
- *  that an interrupt fills.  Frames and commands of the host (C, S6, O, ...) are answered with "\r",
- *  as an adapter does, so that slcand takes the device for one.
+ *  Polled: recv() takes the bytes that the line has and hands over those that wait to be sent, so
+ *  it has to be called at least once per byte time, or the board's uart_get() has to read from a
+ *  buffer that an interrupt fills.  Frames and commands of the host (C, S6, O, ...) are answered
+ *  with "\r", as an adapter does, so that slcand takes the device for one.
  */
 #ifndef BLW_PORT_UART_H
 #define BLW_PORT_UART_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Loaded before user-mode Linux (LD_PRELOAD) on processors with AVX-512 or AMX.  It saves and
- * restores floating-point registers in a buffer for AVX; present kernels refuse to restore less than
- * all there is.  So what it restores is completed by what the process has. */
+ * restores floating-point registers in a buffer for AVX; present kernels refuse to restore less
+ * than all there is.  So what it restores is completed by what the process has. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <elf.h>

@@ -126,8 +126,8 @@ void check_problem(unsigned seed, const std::vector<int> &sizes, int n)
     }
 }
 
-// Rows of Z that are nearly dependent and thresholds far below the attack: whatever the support, the
-// objective does not rise above where it starts, nu = 0.
+// Rows of Z that are nearly dependent and thresholds far below the attack: whatever the support,
+// the objective does not rise above where it starts, nu = 0.
 void check_descent(unsigned seed, const std::vector<int> &sizes, int n,
                    const blw_l1_ops_t *engine = &blw_l1_active_set_ops)
 {

@@ -3,7 +3,8 @@
  *
  *  The plant is x(k+1) = x/2 + u, y_i = x + offset_i, i = 0..2, offsets 1, 2, 3, x(0) = 0; p = 1.
  *  Sets {0,1}, {0,2}, {1,2} with the gains 1/4; subsets {0}, {1}, {2} with h = 2 and
- *  Z = (0.6, 0.8), so that Z O = 0.6 + 0.8/2 = 1.  Averages with gain 1/2 and threshold 1, benign mean 1/2; gate at 10.
+ *  Z = (0.6, 0.8), so that Z O = 0.6 + 0.8/2 = 1.  Averages with gain 1/2 and threshold 1, benign
+ *  mean 1/2; gate at 10.
  */
 #ifndef BANK_MODEL_H
 #define BANK_MODEL_H

@@ -3,8 +3,8 @@
  *
  *  One local state per sensor with Lam = 1/4, b = s, s = sqrt(2/3), all modes secure: Gu_i = 2 s,
  *  Fu_i = 1 / (6 s), and S = I - 1 1'/3 in coordinates with S_ii = 1, so S_ij = -1/2.  With the
- *  innovations v about x_bar:  e = s v,  l_i = 3/2 s (v_i - mean v),  x_hat = x_bar + mean(tau) / 2 s.
- *  k = 2, exclude = 3; the sensors are units of their own.
+ *  innovations v about x_bar:  e = s v,  l_i = 3/2 s (v_i - mean v),
+ *  x_hat = x_bar + mean(tau) / 2 s.  k = 2, exclude = 3; the sensors are units of their own.
  */
 #ifndef GUARD_MODEL_H
 #define GUARD_MODEL_H

@@ -2,8 +2,8 @@
 /** @file guard_random.h  A model of `guard` with random tables of any size, for the solver alone.
  *
  *  One state, x_ref = 0, C = 0: e = Lam eta + b y with random Lam and b.  S = Z Z' with the rows of
- *  every sensor orthonormal, so S_ii = I.  Gu = 0, so eta = e: what is tested is (2) and (3), against
- *  a dense S that is kept beside the tables.
+ *  every sensor orthonormal, so S_ii = I.  Gu = 0, so eta = e: what is tested is (2) and (3),
+ *  against a dense S that is kept beside the tables.
  */
 #ifndef GUARD_RANDOM_H
 #define GUARD_RANDOM_H
@@ -153,7 +153,8 @@ static inline void random_pairs(guard_random_t *made, size_t m, size_t r)
     }
 }
 
-/** Keep two diagonals of Lam_i below the main one, and two numbers of b_i; store them for `reach`. */
+/** Keep two diagonals of Lam_i below the main one, and two numbers of b_i; store them for
+ *  `reach`. */
 static inline void random_band(guard_random_t *made, size_t i, size_t reach)
 {
     const size_t      r    = made->model.r;

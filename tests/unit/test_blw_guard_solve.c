@@ -63,7 +63,8 @@ static double violation(const blw_real_t *tau)
     return worst / (double)made.model.k;
 }
 
-/* Solve once more from the state that the step has left in e, and look at tau before it is fused. */
+/* Solve once more from the state that the step has left in e, and look at tau before it is
+ * fused. */
 static double violation_of_step(bool *converged)
 {
     *converged = out.outcome != (uint8_t)BLW_OUTCOME_BOUND;

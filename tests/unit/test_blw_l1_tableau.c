@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* The fault branches of the tableau engine, on Huber's estimate of a location (see test_blw_l1.c):
- * rows that depend on each other, a bound in the middle of an entry, tables that mislead the sweeps. */
+ * rows that depend on each other, a bound in the middle of an entry, tables that mislead the
+ * sweeps. */
 #include "support.h"
 
 #include "blw/blw_l1.h"
@@ -17,8 +18,8 @@ static const blw_real_t G[3]    = {BLW_R(2.0), BLW_R(2.0), BLW_R(2.0)};
 static const blw_real_t P[1]    = {BLW_R(0.083333333333333329)};
 static const blw_real_t wide[3] = {BLW_R(1.0), BLW_R(1.0), BLW_R(3.0)};
 
-/* Row 2 enters first, then row 0; then row 1, with T_11 = 0, drives row 2 out again and enters: four
- * sweeps.  clip(-5, 1) + clip(-5, 1) + clip(2, 3) = 0 at mu = 5. */
+/* Row 2 enters first, then row 0; then row 1, with T_11 = 0, drives row 2 out again and enters:
+ * four sweeps.  clip(-5, 1) + clip(-5, 1) + clip(2, 3) = 0 at mu = 5. */
 static const blw_real_t dependent[3] = {BLW_R(0.0), BLW_R(0.0), BLW_R(7.0)};
 
 static support_lasso_t made;
@@ -110,8 +111,8 @@ static void test_solve_given_a_row_that_should_not_be_in_drops_it(void)
     TEST_ASSERT_EQUAL_MEMORY(zeta, l1.tau, sizeof zeta); /* nu = 0 */
 }
 
-/* By 0.4 S row 0 seems to keep within its limit once row 2 is in; W says l_0 = -1.7, and the tableau is
- * made anew with row 2 in it.  clip(-2.4) + 0 + clip(87.6) = 0 at mu = 2.4. */
+/* By 0.4 S row 0 seems to keep within its limit once row 2 is in; W says l_0 = -1.7, and the
+ * tableau is made anew with row 2 in it.  clip(-2.4) + 0 + clip(87.6) = 0 at mu = 2.4. */
 static void test_solve_given_a_row_that_was_overlooked_goes_on_from_the_rows_that_are_in(void)
 {
     const blw_real_t zeta[3] = {BLW_R(0.0), BLW_R(2.4), BLW_R(90.0)};

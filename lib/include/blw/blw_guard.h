@@ -14,9 +14,9 @@
  *      eta = e - Gu d_u                                                                     (5)
  *  Certificate: if |l_i| <= k for all i at nu = 0, x_hat is exactly the Kalman estimate.  Else (3)
  *  is solved sensor by sensor, the largest change first: no step size, no factorisation.  Then the
- *  units (sensors, or groups that fall together) with |h_i| > exclude, at most p, the largest first,
- *  get k_i = 0 and (2) is solved on from there: their samples then have no influence at all.  As
- *  soon as it is beyond doubt which units these will be, the first descent ends.  If that leaves
+ *  units (sensors, or groups that fall together) with |h_i| > exclude, at most p, the largest
+ *  first, get k_i = 0 and (2) is solved on from there: their samples then have no influence at all.
+ *  As soon as it is beyond doubt which units these will be, the first descent ends.  If that leaves
  *  another sensor with nu_i /= 0, and the model asks for it, all sets I of p units are searched for
  *  the one whose removal explains most, l_I' S_II^-1 l_I.  (Or whenever a unit is excluded, and
  *  then the first choice stands unless another set explains k^2 / 4 more.)
@@ -44,9 +44,9 @@ extern const blw_guard_solver_t blw_guard_many_ops;
 
 /* Straight-line code that the design tool writes for small models: the same bits as the loops. */
 
-/** x_bar and e of (1) from u [l], y [m], all valid, x_ref and eta.  @return false with nothing changed
- *  unless u, y and x_ref are so small that no bound and no range can be exceeded, which also refuses
- *  NaN. */
+/** x_bar and e of (1) from u [l], y [m], all valid, x_ref and eta.  @return false with nothing
+ *  changed unless u, y and x_ref are so small that no bound and no range can be exceeded, which
+ *  also refuses NaN. */
 typedef bool (*blw_guard_advance_kernel_t)(const blw_real_t *u, const blw_real_t *y,
                                            const blw_real_t *x_ref, const blw_real_t *eta,
                                            blw_real_t *x_bar, blw_real_t *e);

@@ -17,8 +17,8 @@ extern "C" {
 #endif
 
 /** (1) for all sensors as straight-line code that the design tool writes: zeta [m r] with u [l] or
- *  NULL and y [m] without offset.  The same numbers as the loops of blw_jordan_step(); only the sign
- *  of a zero may differ, which no sum over zeta that starts from +0 lets through. */
+ *  NULL and y [m] without offset.  The same numbers as the loops of blw_jordan_step(); only the
+ *  sign of a zero may differ, which no sum over zeta that starts from +0 lets through. */
 typedef void (*blw_jordan_kernel_t)(const blw_real_t *u, const blw_real_t *y, blw_real_t *zeta);
 
 typedef struct blw_jordan_model {

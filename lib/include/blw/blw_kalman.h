@@ -18,8 +18,8 @@
 extern "C" {
 #endif
 
-/** (1) and (2), or (3), for one plant as straight-line code that the design tool writes: x_hat [n] from k-1 to
- *  k with u [l] and all of y [m], the same bits as the loops of blw_kalman_step().
+/** (1) and (2), or (3), for one plant as straight-line code that the design tool writes: x_hat [n]
+ *  from k-1 to k with u [l] and all of y [m], the same bits as the loops of blw_kalman_step().
  *  @return false with x_hat untouched unless u, x_hat and y are so small that no bound and no range
  *  can be exceeded, which also refuses NaN. */
 typedef bool (*blw_kalman_kernel_t)(const blw_real_t *u, const blw_real_t *y, blw_real_t *x_hat);

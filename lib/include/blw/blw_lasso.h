@@ -61,8 +61,8 @@ blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0);
 blw_status_t blw_lasso_step(blw_lasso_t *self, const blw_real_t *u, const blw_real_t *y,
                             blw_mask_t valid, blw_estimator_out_t *out);
 
-/** The same step where the local filters run elsewhere (blw_local.h): zeta [m r] after y(k), for the
- *  sensors in valid; the others go on without a sample.  Same bits as blw_lasso_step(). */
+/** The same step where the local filters run elsewhere (blw_local.h): zeta [m r] after y(k), for
+ *  the sensors in valid; the others go on without a sample.  Same bits as blw_lasso_step(). */
 blw_status_t blw_lasso_fuse(blw_lasso_t *self, const blw_real_t *u, const blw_real_t *zeta,
                             blw_mask_t valid, blw_estimator_out_t *out);
 

@@ -97,8 +97,8 @@ blw_mask_t blw_plant_screen(const blw_plant_t *plant, const blw_real_t *y, blw_m
  *  replaced by x0, so that the estimate recovers when samples come back. */
 void blw_plant_predict(const blw_plant_t *plant, const blw_real_t *x, const blw_real_t *u,
                        blw_real_t *x_bar);
-/** Innovations about a prediction: e_i = y_i - offset_i - C_i x_bar, and 0 for a sample that is not in
- *  valid, which amounts to taking its prediction for it.  m n multiply-adds.
+/** Innovations about a prediction: e_i = y_i - offset_i - C_i x_bar, and 0 for a sample that is not
+ *  in valid, which amounts to taking its prediction for it.  m n multiply-adds.
  *  @param e [m], may not be y. */
 void blw_plant_innovate(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid,
                         const blw_real_t *x_bar, blw_real_t *e);

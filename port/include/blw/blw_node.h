@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/** @file blw_node.h  One estimator on a bus: collects the frames of a step, steps, sends the result.
+/** @file blw_node.h  One estimator on a bus: collects the frames of a step, steps, sends the
+ *  result.
  *
  *  Time.  A sync frame with k begins step k; the node then takes the measurements y(k) and the
- *  inputs u(k-1) until all are there (and settle_us more have passed) or deadline_us after the sync.
- *  What is missing then is missing for the estimator; a missing input keeps its last value, as its
- *  actuator does.  If no sync comes for a period, the node goes on by its own clock.  A sync out of
- *  turn is believed only when most sensors follow it and the next sync confirms it: then the node
- *  steps blind over a gap of at most max_gap steps, and resets its estimator for anything else.
+ *  inputs u(k-1) until all are there (and settle_us more have passed) or deadline_us after the
+ *  sync.  What is missing then is missing for the estimator; a missing input keeps its last value,
+ *  as its actuator does.  If no sync comes for a period, the node goes on by its own clock.  A sync
+ *  out of turn is believed only when most sensors follow it and the next sync confirms it: then the
+ *  node steps blind over a gap of at most max_gap steps, and resets its estimator for anything
+ *  else.
  *
  *  Several frames of one sensor for one step.  Equal values are counted (duplicate) and harmless.
  *  Different values are a contradiction: nobody can tell which is true, so neither is used, the

@@ -4,10 +4,10 @@
  *  For step k a station needs the sync, its own sample (from its owner), the inputs u(k-1), and the
  *  fusion node's estimate x_hat(k-1), sealed by its status frame.  When all are there it steps and
  *  sends its local states (zeta frames).  The next sync ends a step that lacks the sample: the
- *  filter then goes on without it, as the fusion node does.  Without the estimate of the step before
- *  the filter has no reference: the station says nothing until an estimate comes, and starts again
- *  about that one.  At its first step the reference is the model's x0 if that step is 1; otherwise
- *  it waits for an estimate too.
+ *  filter then goes on without it, as the fusion node does.  Without the estimate of the step
+ *  before the filter has no reference: the station says nothing until an estimate comes, and starts
+ *  again about that one.  At its first step the reference is the model's x0 if that step is 1;
+ *  otherwise it waits for an estimate too.
  *
  *  Missing or contradicting inputs keep their last value, as in blw_node.h.
  */

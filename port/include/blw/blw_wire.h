@@ -109,7 +109,8 @@ blw_wire_result_t blw_wire_get_sensors(const blw_frame_t *frame, blw_wire_sensor
 /** Encode.  Writes id, len and data. */
 void blw_wire_put_sync(const blw_wire_sync_t *sync, blw_frame_t *frame);
 /** @return false, with nothing written, for values that no frame of the format can hold: a kind
- *  without values, first not a multiple of blw_wire_span(), count above it, or an index too large. */
+ *  without values, first not a multiple of blw_wire_span(), count above it, or an index too
+ *  large. */
 bool blw_wire_put_values(const blw_wire_values_t *values, blw_wire_format_t format,
                          blw_frame_t *frame);
 void blw_wire_put_status(const blw_wire_status_t *status, blw_frame_t *frame);
