@@ -16,6 +16,7 @@ from blw.build import BUILD, ROOT, build_programs, configure
 from blw.tally import Tally
 
 LLVM = "14"  # Debian 12's; another version formats differently
+CPPCHECK = ("cppcheck", "--quiet", "--std=c99", f"-j{os.cpu_count()}")
 SHELL = ("tools/bulwark", "tools/setup/setup.sh", "tools/check_archive.sh", ".ci/run",
          "tests/archive/test_check_archive.sh", "tests/bus/in_netns.sh", "tests/bus/in_uml.sh")
 
@@ -33,7 +34,7 @@ def run() -> Tally:
         "clang-format": [[f"clang-format-{LLVM}", "--dry-run", "-Werror", *written]],
         "clang-tidy": [[f"clang-tidy-{LLVM}", "--quiet", "-p", str(database), source]
                        for source in library + port],
-        "cppcheck": [["cppcheck", "--quiet", "--std=c99", "--inline-suppr", "--error-exitcode=1",
+        "cppcheck": [[*CPPCHECK, "--inline-suppr", "--error-exitcode=1",
                       "--enable=warning,performance,portability", "-Ilib/include", "-Ilib/src",
                       "-Iport/include", "-Iport/posix", *library, *port]],
         "shellcheck": [["shellcheck", "--external-sources", *SHELL]],
@@ -71,8 +72,8 @@ def _misra(library: Sequence[str]) -> Tally:
     """Hold the ledger of deviations in README.md against what cppcheck finds in the library."""
     scratch = BUILD / "cppcheck"  # else its files land beside the sources
     scratch.mkdir(exist_ok=True)
-    found = _call(["cppcheck", "--quiet", "--std=c99", "--addon=misra", "-Ilib/include",
-                   "-Ilib/src", f"--cppcheck-build-dir={scratch}", *library]).stdout
+    found = _call([*CPPCHECK, "--addon=misra", "-Ilib/include", "-Ilib/src",
+                   f"--cppcheck-build-dir={scratch}", *library]).stdout
     broken = set(re.findall(r"misra-c2012-([\d.]+)", found))
     rows = re.findall(r"^\| D-\d+ \| ([\d., ]+) \|", (ROOT / "README.md").read_text("utf-8"), re.M)
     listed = {rule for row in rows for rule in row.split(", ")}
