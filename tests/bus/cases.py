@@ -22,6 +22,7 @@ LINKS = {"can": ("can:vcan0", "can:vcan1"), "canfd": ("canfd:vcan0", "canfd:vcan
 FAULTS = ("babble", "crc", "stale", "early", "duplicate", "sync", "garbage")
 FRAMES_PER_STEP = {"can": 6, "canfd": 3, "lcm": 3, "slcan": 6}  # sync, 1 input, 4 measurements
 PACE_US = 3000
+OUTAGE_S = 1.5                          # 15 steps of link_lost
 TIMEOUT_S = 400
 #: A deadline that no busy machine misses; the next sync ends a step that lacks a frame anyway.
 PATIENT_US = 20_000_000
@@ -217,13 +218,16 @@ def other_model(bus: Bus, _: int, other: str) -> dict:
 
 
 def link_lost(bus: Bus, _: int) -> dict:
-    """The interface goes down, or the line is hung up, for a second in the middle of a run."""
-    node = bus.node("link_lost", "--period-us", 50_000, deadline_us=300_000)
-    plant = bus.plant("link_lost", "short.toml", "--pace-us", 50_000)
+    """The interface goes down, or the line is hung up, for a while in the middle of a run.
+
+    A machine that stands still makes it longer: the run takes several times as long.
+    """
+    node = bus.node("link_lost", "--period-us", 100_000, deadline_us=300_000)
+    plant = bus.plant("link_lost", "short.toml", "--pace-us", 100_000)
     time.sleep(1.5)
     if bus.transport == "slcan":
         bus.hubs[0].close()
-        time.sleep(1.0)
+        time.sleep(OUTAGE_S)
         bus.hubs[0].open()
     else:
         interface_down("lo" if bus.transport == "lcm" else "vcan0")
@@ -231,8 +235,8 @@ def link_lost(bus: Bus, _: int) -> dict:
 
 
 def interface_down(interface: str) -> None:
-    """For a second."""
-    for state, pause in (("down", 1.0), ("up", 0.0)):
+    """For a while."""
+    for state, pause in (("down", OUTAGE_S), ("up", 0.0)):
         subprocess.run(["ip", "link", "set", interface, state], check=True)
         time.sleep(pause)
     if interface == "lo":
