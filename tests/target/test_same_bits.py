@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: MIT
 """The same attacked steps on the host and on every target: the same bits, in every output word."""
 
-import os
 from functools import cache
 
 import numpy as np
@@ -11,7 +10,7 @@ from emulated import available, prepared
 from blw.cost import measure, programs
 from blw.cost.programs import Program
 
-STEPS = 10_000 if os.environ.get("BULWARK_EXTENDED") == "1" else 2500
+STEPS = 10_000
 METHODS = {"kalman": "pendulum", "lasso": "pendulum", "canonical": "pendulum",
            "decentral": "pendulum", "bank": "pendulum", "joint": "grid4", "guard": "pendulum"}
 
