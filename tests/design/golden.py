@@ -30,6 +30,12 @@ def build(name: str, plant: dict[str, Any]) -> tuple[Model, Kalman]:
     return made, kalman.steady_state(made.A, made.C, made.W, made.R)
 
 
+def shipped(name: str) -> tuple[Model, Kalman]:
+    """A model of host_sim/models and its Kalman filter."""
+    made = model.load(MODELS / f"{name}.toml")
+    return made, kalman.steady_state(made.A, made.C, made.W, made.R)
+
+
 def random_plant(n: int, m: int, seed: int) -> tuple[Model, Kalman]:
     """Marginally stable A, correlated R, two inputs."""
     generator = np.random.default_rng(seed)

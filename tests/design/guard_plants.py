@@ -72,14 +72,11 @@ def simulate(plant, steps, seed, feedback=None):
 
 
 def liu5():
-    plant = model.load(golden.MODELS / "liu5.toml")
-    return plant, kalman.steady_state(plant.A, plant.C, plant.W, plant.R), [[0.0, 0.0, -2.0]]
+    return *golden.shipped("liu5"), [[0.0, 0.0, -2.0]]
 
 
 def pendulum():
-    plant = model.load(golden.MODELS / "pendulum.toml")
-    gain = [[-0.604, -1.678, -39.514, -9.721]]
-    return plant, kalman.steady_state(plant.A, plant.C, plant.W, plant.R), gain
+    return *golden.shipped("pendulum"), [[-0.604, -1.678, -39.514, -9.721]]
 
 
 def trace_without(plant, sensors):

@@ -7,17 +7,13 @@ import re
 import golden
 import numpy as np
 import pytest
+from golden import shipped
 
-from blw import canonical, canonical_form, kalman, model, modes, options
+from blw import canonical, canonical_form, model, modes, options
 from blw.errors import DesignError, ModelError
 from blw.local_filters import local_filters
 
 UNEQUAL = [1.0, 1.03, 1.07, 1.13, 1.21, 1.33]
-
-
-def shipped(name):
-    loaded = model.load(golden.MODELS / f"{name}.toml")
-    return loaded, kalman.steady_state(loaded.A, loaded.C, loaded.W, loaded.R)
 
 
 def parts(plant, gains):

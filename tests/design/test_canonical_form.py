@@ -5,7 +5,7 @@ import golden
 import numpy as np
 import pytest
 
-from blw import canonical, canonical_form, kalman, model, modes
+from blw import canonical, canonical_form, modes
 from blw.local_filters import local_filters
 
 SHIPPED = ["pendulum", "pendulum_physical", "drone5", "drone6", "torsion", "grid4", "random6"]
@@ -31,8 +31,7 @@ def chosen(plant, gains, choice):
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_auto_given_modes_that_can_be_told_apart_keeps_the_jordan_coordinates(name):
-    plant = model.load(golden.MODELS / f"{name}.toml")
-    gains = kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
+    plant, gains = golden.shipped(name)
     form = chosen(plant, gains, "auto")
     assert form.changed == []
     np.testing.assert_array_equal(form.X, form.modes.X)
@@ -55,8 +54,7 @@ def test_auto_given_distant_modes_of_the_same_plant_changes_nothing():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_steady_grows_no_more_than_jordan(name):
-    plant = model.load(golden.MODELS / f"{name}.toml")
-    gains = kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
+    plant, gains = golden.shipped(name)
     jordan, steady = (chosen(plant, gains, choice) for choice in ("jordan", "steady"))
     assert steady.growth <= jordan.growth
 
@@ -95,8 +93,7 @@ def test_transforms_given_orthogonal_coordinates_turn_local_states_into_them(nam
     elif name == "slow pair":  # 1 +- 1e-3 i
         plant, gains = build([[1.0, 1e-2], [-1e-4, 1.0]], [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])
     else:
-        plant = model.load(golden.MODELS / f"{name}.toml")
-        gains = kalman.steady_state(plant.A, plant.C, plant.W, plant.R)
+        plant, gains = golden.shipped(name)
     form = chosen(plant, gains, "orthogonal")
     n = plant.n
     assert np.linalg.cond(form.X) <= np.linalg.cond(form.modes.X) * (1.0 + 1e-9)

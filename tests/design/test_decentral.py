@@ -9,10 +9,10 @@ import shared_data
 from c_library import BLIND, CONVERGED, DEGRADED, HELD, KALMAN, MISSING, WARMING_UP
 from decentral_library import Decentral, compile_library
 from decentral_reference import Reference, parse, random_plant, simulate
-from golden import MODELS
+from golden import shipped
 from scipy import stats
 
-from blw import decentral, kalman, model
+from blw import decentral
 from blw.decentral_fusion import candidates
 from blw.errors import DesignError
 
@@ -23,11 +23,6 @@ Options = decentral.Options
 def libraries(tmp_path_factory):
     folder = tmp_path_factory.mktemp("decentral")
     return {width: compile_library(folder, width) for width in ("f32", "f64")}
-
-
-def shipped(name):
-    made = model.load(MODELS / f"{name}.toml")
-    return made, kalman.steady_state(made.A, made.C, made.W, made.R)
 
 
 def estimator(library, plant, kalman_filter, options=None):

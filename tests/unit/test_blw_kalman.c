@@ -120,20 +120,28 @@ static void test_step_given_the_closed_form_takes_it_where_every_sample_is_there
     TEST_ASSERT_REAL_WITHIN(1000.0 * SUPPORT_TOL, 1383.0, out.x_hat[0]);
 }
 
-static void test_step_given_the_closed_form_and_samples_that_overflow_it_predicts(void)
+/* Samples that overflow the state are left out, all of them. */
+static void check_overflow(void)
 {
-    const blw_real_t Acl[1] = {BLW_R(0.25)};
-    const blw_real_t K[3]   = {BLW_SIGNAL_MAX, BLW_R(0.0), BLW_R(0.0)};
-    const blw_real_t far[3] = {BLW_SIGNAL_MAX, y[1], y[2]};
+    static const blw_real_t K[3]   = {BLW_SIGNAL_MAX, BLW_R(0.0), BLW_R(0.0)};
+    const blw_real_t        far[3] = {BLW_SIGNAL_MAX, y[1], y[2]};
 
-    made.model.K   = K;
-    made.model.Acl = Acl;
-    made.model.Bcl = Acl;
+    made.model.K = K;
     support_kalman_seal(&made);
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_init(&filter, &made.model, mem, MEM));
     TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, far, 7U, &out));
     TEST_ASSERT_REAL_WITHIN(0.0, 3.0, out.x_hat[0]);
     TEST_ASSERT_EQUAL_HEX64(0U, out.used);
+    TEST_ASSERT_REAL_WITHIN(0.0, 1.0, out.suspicion[1]);
+}
+
+static void test_step_given_the_closed_form_and_samples_that_overflow_it_predicts(void)
+{
+    const blw_real_t Acl[1] = {BLW_R(0.25)};
+
+    made.model.Acl = Acl;
+    made.model.Bcl = Acl;
+    check_overflow();
     made.model.Bcl = NULL;
     TEST_ASSERT_EQUAL_INT(BLW_ERR_MODEL, blw_kalman_init(&filter, &made.model, mem, MEM));
 }
@@ -181,16 +189,7 @@ static void test_step_given_wrong_arguments_leaves_state_and_out_untouched(void)
 
 static void test_step_given_samples_that_overflow_the_state_predicts(void)
 {
-    const blw_real_t K[3]   = {BLW_SIGNAL_MAX, BLW_R(0.0), BLW_R(0.0)};
-    const blw_real_t far[3] = {BLW_SIGNAL_MAX, y[1], y[2]};
-
-    made.model.K = K;
-    support_kalman_seal(&made);
-    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_init(&filter, &made.model, mem, MEM));
-    TEST_ASSERT_EQUAL_INT(BLW_OK, blw_kalman_step(&filter, u, far, 7U, &out));
-    TEST_ASSERT_REAL_WITHIN(0.0, 3.0, out.x_hat[0]);
-    TEST_ASSERT_EQUAL_HEX64(0U, out.used);
-    TEST_ASSERT_REAL_WITHIN(0.0, 1.0, out.suspicion[1]);
+    check_overflow();
 }
 
 static void test_step_given_an_unstable_plant_recovers_after_any_time_without_samples(void)

@@ -97,9 +97,10 @@ def choose(filters: LocalFilters, modes: Modes, choice: Choice) -> CanonicalForm
     if choice == "jordan":
         return _form(filters, modes, modes.X)
     forgetting = 1.0 - float(np.abs(filters.form.eigenvalues).max())
-    reaches = [part * forgetting for part in REACHES]
+    others = [orthogonal(modes, clusters(modes, part * forgetting)) for part in REACHES]
+    different = {X.tobytes(): X for X in [modes.X, *others]}
     forms, errors = [], []
-    for X in [modes.X, *(orthogonal(modes, clusters(modes, reach)) for reach in reaches)]:
+    for X in different.values():
         try:
             forms.append(_form(filters, modes, X))
         except DesignError as error:

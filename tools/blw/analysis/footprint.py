@@ -100,8 +100,7 @@ def _lasso(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
 def _joint(designed: Designed, plant: dict[str, Any]) -> tuple[int, int]:
     """Filters and fusion; the recursion adds the factors of its rows."""
     n, m, r, recursive = designed.mem
-    samples = len(designed.tables.to_json()["sensor"])
-    cost = _predict(plant) + m * n + (2 * r - 1) * n * n + samples * (2 * n + 2)
+    cost = instructions.joint_terms(designed, plant)
     rows = r * (n + 2)
     cost += rows * rows * (rows + 2 * r + n + m) if recursive else 0
     return cost, cost

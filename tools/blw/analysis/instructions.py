@@ -101,6 +101,13 @@ def _bank(designed: Designed, plant: dict[str, Any]) -> int:
                                + BANK_TEST * pairs)
 
 
+def joint_terms(designed: Designed, plant: dict[str, Any]) -> int:
+    """Multiply-adds of the filters and the fusion by a schedule."""
+    n, m, r, _ = designed.mem
+    samples = len(designed.tables.to_json()["sensor"])
+    return n * (n + plant["l"]) + m * n + (2 * r - 1) * n * n + samples * (2 * n + 2)
+
+
 def _joint(designed: Designed, plant: dict[str, Any]) -> int:
     """The recursion factors its R rows of the length W, and every sample corrects the n + 2 rows of
     its local estimator."""
@@ -110,8 +117,8 @@ def _joint(designed: Designed, plant: dict[str, Any]) -> int:
         R = r * (n + 2)
         W = R + 2 * r + n + m
         return round(W * (JOINT_FACTOR * R * R + JOINT_SAMPLE * samples * (n + 2) + JOINT_ROW * R))
-    macs = (n * (n + plant["l"]) + m * n + (2 * r - 1) * n * n + samples * (2 * n + 2))
-    return JOINT_AROUND + round(JOINT_SENSOR * (m + samples) + JOINT_LOCAL * r + JOINT_LOOP * macs)
+    return JOINT_AROUND + round(JOINT_SENSOR * (m + samples) + JOINT_LOCAL * r
+                                + JOINT_LOOP * joint_terms(designed, plant))
 
 
 def _guard(designed: Designed, plant: dict[str, Any]) -> int:
