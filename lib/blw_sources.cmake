@@ -41,6 +41,7 @@ set(BLW_SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_support.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_factor.c
+  ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton_finish.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton_start.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_newton_step.c
   ${CMAKE_CURRENT_LIST_DIR}/src/blw_l1_tableau.c

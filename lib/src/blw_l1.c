@@ -8,6 +8,7 @@
  * so with the two constants of the model
  *     |x* - x| <= kappa_G (sum_g c_g (|nu_g| + |nu*_g|) + kappa_W e).                        (6)
  * (6) holds always and is coarse under a large attack; a verified optimum gives a sharp bound. */
+#include "blw/blw_l1_survey.h"
 #include "blw_cold.h"
 #include "blw_l1_internal.h"
 
@@ -65,21 +66,16 @@ void blw_l1_multipliers(blw_l1_t *self)
 
 blw_real_t blw_l1_statistic(const blw_l1_t *self)
 {
-    const blw_l1_model_t *const m   = self->model;
-    const bool                  one = !blw_l1_has_pairs(m); /* row g is group g */
-    blw_real_t                  max = BLW_R(0.0);
+    const blw_l1_model_t *const m    = self->model;
+    const bool                  one  = !blw_l1_has_pairs(m); /* row g is group g */
+    blw_real_t                  most = BLW_R(0.0);
 
     for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t norm  = one ? blw_la_abs(self->l[g]) : blw_l1_norm(m, g, self->l);
-        const blw_real_t ratio = norm / m->c[g];
-        if (!(ratio <= max)) {
-            if (!(ratio <= BLW_REAL_MAX)) {
-                return ratio; /* a NaN must not pass for 0 */
-            }
-            max = ratio;
-        }
+        const blw_real_t norm = one ? blw_la_abs(self->l[g]) : blw_l1_norm(m, g, self->l);
+
+        most = blw_l1_larger(most, norm, m->c[g]);
     }
-    return max;
+    return most;
 }
 
 bool blw_l1_in_support(const blw_l1_t *self, size_t g)
@@ -149,25 +145,44 @@ static BLW_APART void report_gap(const blw_l1_t *self, const blw_real_t *zeta, b
 blw_real_t blw_l1_objective(const blw_l1_t *self, const blw_real_t *zeta)
 {
     const blw_l1_model_t *const m   = self->model;
-    blw_real_t                  sum = BLW_R(0.5) * blw_la_dot(m->N, self->tau, self->l);
+    blw_real_t                  sum = blw_la_max(blw_la_dot(m->N, self->tau, self->l), BLW_R(0.0));
 
+    sum *= BLW_R(0.5);
     for (size_t g = 0U; g < m->n_groups; g++) {
         sum += m->c[g] * blw_l1_nu_norm(self, zeta, g);
     }
     return sum;
 }
 
-/* An engine that was cut short may have been led astray by rounding: what it leaves counts only if
- * it is better than nu = 0, the Kalman estimate. */
-static void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
+/* Objective (1) for tau = 0, x = 0: all of zeta is attack. */
+static BLW_COLD blw_real_t objective_of_none(const blw_l1_model_t *m, const blw_real_t *zeta)
 {
-    const blw_l1_model_t *const m = self->model;
+    blw_real_t sum = BLW_R(0.0);
+
+    for (size_t g = 0U; g < m->n_groups; g++) {
+        sum += m->c[g] * blw_l1_norm(m, g, zeta);
+    }
+    return sum;
+}
+
+/* An engine that was cut short may have been led astray by rounding, and where an attack is large
+ * it is: what it leaves counts only if it is better than nu = 0, the Kalman estimate, and than
+ * tau = 0, which keeps the reference that zeta is relative to. */
+static BLW_COLD void moderate(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
+{
+    const blw_l1_model_t *const m    = self->model;
+    const blw_real_t            none = objective_of_none(m, zeta);
 
     m->engine->multiply(self, zeta);
-    const blw_real_t kalman = BLW_R(0.5) * blw_la_dot(m->N, zeta, self->l);
+    const blw_real_t all = BLW_R(0.5) * blw_la_dot(m->N, zeta, self->l);
     m->engine->multiply(self, self->tau);
-    if (!(blw_l1_objective(self, zeta) < kalman)) {
-        blw_la_copy(m->N, zeta, self->tau);
+    const blw_real_t found = blw_l1_objective(self, zeta);
+    if (!((found < all) && (found < none))) {
+        if (all <= none) {
+            blw_la_copy(m->N, zeta, self->tau);
+        } else {
+            blw_la_zero(m->N, self->tau);
+        }
         m->engine->multiply(self, self->tau);
     }
     blw_la_gemv(m->n, m->N, m->F, self->tau, x);
@@ -197,11 +212,20 @@ BLW_COLD void blw_l1_lay_out_Z(blw_l1_t *self, blw_real_t *mem)
 
 BLW_COLD void blw_l1_reset(blw_l1_t *self)
 {
-    blw_la_fill(self->model->N, BLW_R(0.0), self->tau);
-    blw_la_fill(self->model->N, BLW_R(0.0), self->dir);
+    blw_la_zero(self->model->N, self->tau);
+    blw_la_zero(self->model->N, self->dir);
     self->n_A    = 0U;
     self->rows   = 0U;
     self->solved = true;
+}
+
+/* The estimate for nu = 0. */
+static void take_all(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x)
+{
+    const blw_l1_model_t *const m = self->model;
+
+    blw_la_copy(m->N, zeta, self->tau);
+    blw_la_gemv(m->n, m->N, m->F, self->tau, x);
 }
 
 void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw_l1_info_t *info)
@@ -209,8 +233,12 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
     const blw_l1_model_t *const m = self->model;
 
     *info = (blw_l1_info_t){.kalman = false};
-    m->engine->multiply(self, zeta);
-    info->statistic = blw_l1_statistic(self);
+    if (m->fast != NULL) {
+        info->statistic = m->fast->certify(self, zeta, x_hat);
+    } else {
+        m->engine->multiply(self, zeta);
+        info->statistic = blw_l1_statistic(self);
+    }
     if ((info->statistic > BLW_R(1.0)) && (info->statistic <= BLW_REAL_MAX)) {
         m->engine->solve(self, zeta, x_hat, info);
         if (!info->converged) {
@@ -221,8 +249,9 @@ void blw_l1_solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, blw
         info->converged = info->kalman;
         self->n_A       = 0U;
         self->rows      = 0U;
-        blw_la_copy(m->N, zeta, self->tau);
-        blw_la_gemv(m->n, m->N, m->F, self->tau, x_hat);
+        if (m->fast == NULL) {
+            take_all(self, zeta, x_hat);
+        }
     }
     self->solved = info->converged;
     if (!info->converged) {

@@ -3,6 +3,7 @@
  * all groups have one row, and then changes A by one group: the first whose nu vanishes on the way
  * leaves, or, once the residual on A is small, the one that violates |l_g| <= c_g most enters.  The
  * objective never rises; the end is verified with z and l formed anew from tau. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Residual on A, relative to c_g + |z|: low enough for a group to enter; low enough for the end;
@@ -142,7 +143,7 @@ static void search(const blw_l1_t *self, const blw_real_t *zeta, pass_t *pass)
 
 /* Drop every pair for which nu_g = 0 is the best with all others fixed,
  * |l_g + Z_g Z_g' nu_g| <= c_g, or that rounding has brought there. */
-static bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
+static BLW_APART bool drop_pairs(blw_l1_t *self, const blw_real_t *zeta)
 {
     const blw_l1_model_t *const m       = self->model;
     bool                        dropped = false;

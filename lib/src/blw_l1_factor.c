@@ -127,11 +127,11 @@ bool blw_l1_factor(blw_l1_t *self, size_t f, size_t size, blw_real_t share)
     return weak;
 }
 
-void blw_l1_solve_LJL(blw_l1_t *self, size_t f, size_t size)
+void blw_l1_solve_LJL(const blw_l1_t *self, size_t f, size_t size, blw_real_t *v)
 {
-    blw_la_solve_lower(size, self->L, self->step);
+    blw_la_solve_lower(size, self->L, v);
     for (size_t k = f; k < size; k++) {
-        self->step[k] = -self->step[k];
+        v[k] = -v[k];
     }
-    blw_la_solve_lower_t(size, self->L, self->step);
+    blw_la_solve_lower_t(size, self->L, v);
 }

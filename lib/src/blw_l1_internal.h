@@ -138,8 +138,8 @@ void blw_l1_predict(const blw_l1_model_t *m, const blw_real_t *l, const blw_real
  * columns of G, becomes its factor L J L', J = diag(I, -I).
  * @return whether the square of one of the first f pivots is below a share of the diagonal. */
 bool blw_l1_factor(blw_l1_t *self, size_t f, size_t size, blw_real_t share);
-/* self->step [size] = (L J L')^-1 self->step. */
-void blw_l1_solve_LJL(blw_l1_t *self, size_t f, size_t size);
+/* v [size] = (L J L')^-1 v. */
+void blw_l1_solve_LJL(const blw_l1_t *self, size_t f, size_t size, blw_real_t *v);
 
 /* Solve the optimality conditions for the rows in dir and l on them: l on the others, nu in tau and
  * x [n].  *bound = |last correction of x|.  @return whether they make a minimum. */

@@ -44,7 +44,7 @@ static BLW_APART factor_t factorise(blw_l1_t *self)
     for (size_t k = 0U; k < m->n; k++) {
         blw_real_t *const Lr = blw_l1_row_of_L(self, made.f + k);
         gather(self, &m->G[k], m->n, m->N, Lr);
-        blw_la_fill(k + 1U, BLW_R(0.0), &Lr[made.f]);
+        blw_la_zero(k + 1U, &Lr[made.f]);
     }
     made.size = made.f + m->n;
     (void)blw_l1_factor(self, made.f, made.size, BLW_R(0.0));
@@ -101,7 +101,7 @@ static blw_real_t correct(blw_l1_t *self, factor_t made, blw_real_t *x)
     const blw_l1_model_t *const m = self->model;
     size_t                      q = 0U;
 
-    blw_l1_solve_LJL(self, made.f, made.size);
+    blw_l1_solve_LJL(self, made.f, made.size, self->step);
     for (size_t i = 0U; i < m->N; i++) {
         if (!blw_l1_clipped(self, i)) {
             self->l[i] += self->step[q];
@@ -120,7 +120,7 @@ bool blw_l1_kkt(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_real_
     for (size_t i = 0U; i < m->N; i++) {
         self->l[i] = m->c[i] * self->dir[i];
     }
-    blw_la_fill(m->n, BLW_R(0.0), x);
+    blw_la_zero(m->n, x);
     residual(self, zeta, x);
     (void)correct(self, made, x);
     residual(self, zeta, x);

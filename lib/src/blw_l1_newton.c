@@ -3,14 +3,14 @@
  * or outside, l_g = c_g nu_g / |nu_g|, where only a pair can still turn.  A Newton step solves the
  * optimality conditions for the present groups inside and outside (blw_l1_newton_step.c); few rows
  * are inside in the end, often hardly more than n, so that a step is cheap.  The sides come from
- * passes of alternating directions (blw_l1_newton_start.c); mostly a few steps correct them until x
- * stands, verified by (4).  Where they do not, continuation [Madsen, Nielsen, "A finite smoothing
- * algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)]: |nu_g| is rounded off below
- * w = kappa width_g, width_g = the benign standard deviation of zeta_g,
+ * passes of alternating directions (blw_l1_newton_start.c); mostly a few steps correct them until
+ * (4) holds (blw_l1_newton_finish.c).  Where they do not, continuation [Madsen, Nielsen, "A finite
+ * smoothing algorithm for linear l1 estimation", SIAM J. Optimization 3 (1993)]: |nu_g| is rounded
+ * off below w = kappa width_g, width_g = the benign standard deviation of zeta_g,
  *     p(nu) = |nu|^2 / (2 w) + w / 2  if |nu| <= w,  else |nu|,                                (1)
  * which makes the objective smooth, l_g = c_g nu_g / max(|nu_g|, w), inside where that is linear; a
- * search along each step keeps the objective falling.  Once that has settled, kappa falls by a
- * fixed ratio, and where no group has changed sides for one kappa, kappa = 0 is tried again. */
+ * search along each step keeps the objective falling.  Once that has settled for a kappa that is
+ * small, kappa = 0 is tried again; where that does not do, kappa falls by a fixed ratio. */
 #include "blw_l1_newton.h"
 #include "blw_cold.h"
 
@@ -19,15 +19,11 @@
 #define KAPPA_LAST  BLW_R(1e-6)
 #define KAPPA_RISE  BLW_R(25.0) /* while none has settled */
 
-/* Most steps for one kappa, and for kappa = 0. */
-#define STEPS       12U
-#define STEPS_FINAL 10U
+/* Largest kappa from whose minimum kappa = 0 is tried. */
+#define KAPPA_TRIED BLW_R(0.05)
 
-/* Most groups that may change sides in one step with kappa = 0. */
-#define WRONG 6U
-
-/* |l_g| / c_g that rounding may leave inside. */
-#define SLACK (BLW_R(1.0) + (BLW_R(64.0) * BLW_REAL_EPS))
+/* Most steps for one kappa. */
+#define STEPS 12U
 
 /* Least share of a step that is worth another. */
 #define STUCK BLW_R(1e-9)
@@ -43,16 +39,9 @@
 #define NOISE \
     (BLW_R(64.0) * BLW_REAL_EPS) /* of the objective: what rounding may leave of a slope */
 
-/* Last change of x, in standard deviations: its square is below rounding. */
-#ifdef BLW_REAL_DOUBLE
-#define SMALL BLW_R(1e-7)
-#else
-#define SMALL BLW_R(1e-4)
-#endif
-
-/* Direction and side of every group for the present nu; with keep, only directions.
+/* Direction and side of every group for the present nu.
  * @return groups that changed sides or turned round. */
-static BLW_APART size_t aim(const blw_l1_newton_t *at, bool keep)
+static BLW_APART size_t aim(const blw_l1_newton_t *at)
 {
     blw_l1_t *const             self  = at->l1;
     const blw_l1_model_t *const m     = self->model;
@@ -63,9 +52,9 @@ static BLW_APART size_t aim(const blw_l1_newton_t *at, bool keep)
         const bool       before = blw_l1_outside(self, g, i);
         blw_real_t       nu[2];
         const blw_real_t norm    = blw_l1_nu(at, g, nu);
-        const bool       outside = (keep && before) || (!keep && (norm > (at->kappa * self->A[g])));
+        const bool       outside = norm > (at->kappa * self->A[g]);
         const bool       turned  = blw_la_dot(blw_l1_size(m, g), nu, &self->dir[i]) < BLW_R(0.0);
-        for (size_t j = i; (j < m->first[g + 1U]) && !(keep && (norm <= BLW_R(0.0))); j++) {
+        for (size_t j = i; j < m->first[g + 1U]; j++) {
             self->dir[j] = outside ? (nu[j - i] / norm) : BLW_R(0.0);
         }
         moved += ((outside != before) || turned) ? 1U : 0U;
@@ -187,106 +176,15 @@ static void loosen(blw_l1_newton_t *at)
 {
     at->kappa *= KAPPA_RISE;
     restore(at);
-    (void)aim(at, false);
+    (void)aim(at);
 }
 
-/* Groups whose nu has turned round go inside.  @return their number. */
-static BLW_APART size_t take_back(const blw_l1_newton_t *at)
-{
-    const blw_l1_t *const       self  = at->l1;
-    const blw_l1_model_t *const m     = self->model;
-    size_t                      moved = 0U;
-
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        const size_t i  = m->first[g];
-        blw_real_t   nu = BLW_R(0.0); /* along dir */
-        for (size_t j = i; j < m->first[g + 1U]; j++) {
-            nu += (at->zeta[j] - self->tau[j]) * self->dir[j];
-        }
-        if (!(nu >= BLW_R(0.0))) {
-            for (size_t j = i; j < m->first[g + 1U]; j++) {
-                self->tau[j] = at->zeta[j];
-                self->dir[j] = BLW_R(0.0);
-            }
-            moved++;
-        }
-    }
-    return moved;
-}
-
-/* Of the groups inside with |l_g| > c_g the worst goes outside.  @return their number. */
-static BLW_APART size_t let_out(const blw_l1_newton_t *at)
-{
-    const blw_l1_t *const       self  = at->l1;
-    const blw_l1_model_t *const m     = self->model;
-    blw_real_t                  most  = BLW_R(0.0);
-    size_t                      worst = m->n_groups;
-    size_t                      count = 0U;
-
-    for (size_t g = 0U; g < m->n_groups; g++) {
-        const blw_real_t norm = blw_l1_norm(m, g, self->l);
-        if (!(norm <= (SLACK * m->c[g])) && !blw_l1_outside(self, g, m->first[g])) {
-            count++;
-            if ((norm / m->c[g]) > most) {
-                most  = norm / m->c[g];
-                worst = g;
-            }
-        }
-    }
-    if (worst < m->n_groups) {
-        for (size_t j = m->first[worst]; j < m->first[worst + 1U]; j++) {
-            self->dir[j] = self->l[j] / (most * m->c[worst]);
-        }
-    }
-    return count;
-}
-
-/* |dx|; whether it is a small part of the standard deviations of x in *small. */
-static BLW_APART blw_real_t last_change(const blw_l1_newton_t *at, bool *small)
-{
-    const blw_l1_model_t *const m  = at->l1->model;
-    const blw_real_t *const     dx = at->l1->step;
-
-    *small = true;
-    for (size_t j = 0U; j < m->n; j++) {
-        const blw_real_t P_jj = m->P[blw_la_packed_row(j) + j];
-        *small                = *small && ((dx[j] * dx[j]) <= (SMALL * SMALL * P_jj));
-    }
-    return blw_la_norm(m->n, dx);
-}
-
-/* Steps with kappa = 0.  @return whether they end in a minimum. */
-static BLW_APART bool finish(blw_l1_newton_t *at, blw_l1_info_t *info)
-{
-    const blw_l1_model_t *const m     = at->l1->model;
-    const blw_real_t            kappa = at->kappa;
-    bool                        small = false;
-    size_t                      wrong = 0U;
-
-    at->kappa = BLW_R(0.0);
-    for (size_t k = 0U; (k < STEPS_FINAL) && !(small && (wrong == 0U)) && (wrong <= WRONG)
-                        && (info->iterations < m->max_iterations);
-         k++) {
-        blw_l1_newton_step(at);
-        info->iterations++;
-        info->bound = last_change(at, &small);
-        move(at, BLW_R(1.0));
-        wrong = take_back(at);
-        (void)aim(at, true);
-        wrong += let_out(at);
-    }
-    at->kappa = kappa;
-    return small && (wrong == 0U) && !at->weak;
-}
-
-/* Newton steps for one kappa, *quiet if no group has changed sides.
- * @return whether they settled. */
-static BLW_APART bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *quiet)
+/* Newton steps for one kappa.  @return whether they settled. */
+static BLW_APART bool descend(blw_l1_newton_t *at, blw_l1_info_t *info)
 {
     bool       settled = false;
     blw_real_t alpha   = BLW_R(1.0);
 
-    *quiet = true;
     for (size_t k = 0U; (k < STEPS) && !settled && (alpha >= STUCK)
                         && (info->iterations < at->l1->model->max_iterations);
          k++) {
@@ -294,8 +192,7 @@ static BLW_APART bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *qu
         info->iterations++;
         alpha = search(at);
         move(at, alpha);
-        const bool stayed = (aim(at, false) == 0U);
-        *quiet            = *quiet && stayed;
+        const bool stayed = (aim(at) == 0U);
         settled = (stayed && (alpha >= BLW_R(1.0))) || (blw_l1_newton_residual(at) <= SETTLED);
     }
     return settled;
@@ -304,34 +201,33 @@ static BLW_APART bool descend(blw_l1_newton_t *at, blw_l1_info_t *info, bool *qu
 /* kappa = 0 from the point that was kept, or back to it.  @return whether that is the minimum. */
 static BLW_APART bool try_to_finish(blw_l1_newton_t *at, blw_l1_info_t *info)
 {
-    const bool done = finish(at, info);
+    const bool done = blw_l1_newton_finish(at, info);
 
     if (!done) {
         restore(at);
-        (void)aim(at, false);
+        (void)aim(at);
     }
     return done;
 }
 
 static void solve(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x, blw_l1_info_t *info)
 {
-    const blw_l1_model_t *const m     = self->model;
-    blw_l1_newton_t             at    = {.l1 = self, .zeta = zeta};
-    bool                        any   = false; /* whether a kappa has settled */
-    bool                        quiet = true;
+    const blw_l1_model_t *const m   = self->model;
+    blw_l1_newton_t             at  = {.l1 = self, .zeta = zeta};
+    bool                        any = false; /* whether a kappa has settled */
 
     at.x = x;
     blw_l1_newton_start(&at);
     keep(&at);
     info->converged = try_to_finish(&at, info);
     while (!info->converged && (info->iterations < m->max_iterations) && (at.kappa >= KAPPA_LAST)) {
-        const bool settled = descend(&at, info, &quiet);
+        const bool settled = descend(&at, info);
         const bool last    = (at.kappa * KAPPA_RATIO) < KAPPA_LAST;
         if (settled) {
             keep(&at);
             any = true;
         }
-        if (last || (settled && quiet)) {
+        if (last || (settled && (at.kappa <= KAPPA_TRIED))) {
             info->converged = try_to_finish(&at, info);
         }
         if (!info->converged && any) {

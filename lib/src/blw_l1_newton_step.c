@@ -51,9 +51,8 @@ static bool turned(const blw_l1_t *self, size_t q, size_t *i)
     return at < 0;
 }
 
-/* out = E' v for the first `count` columns, v with its rows `stride` apart.  out may be v. */
-static void gather(const blw_l1_t *self, size_t count, const blw_real_t *v, size_t stride,
-                   blw_real_t *out)
+void blw_l1_newton_gather(const blw_l1_t *self, size_t count, const blw_real_t *v, size_t stride,
+                          blw_real_t *out)
 {
     for (size_t q = 0U; q < count; q++) {
         size_t                  i;
@@ -63,7 +62,7 @@ static void gather(const blw_l1_t *self, size_t count, const blw_real_t *v, size
     }
 }
 
-/* The same for the turned sum of the rows of W that belong to the pair at row i. */
+/* blw_l1_newton_gather() of the turned sum of the rows of W that belong to the pair at row i. */
 static void gather_turned(const blw_l1_t *self, size_t count, size_t i, blw_real_t *out)
 {
     const blw_real_t *const A = &self->model->W[blw_la_packed_row(i)];
@@ -81,8 +80,7 @@ static void gather_turned(const blw_l1_t *self, size_t count, size_t i, blw_real
     }
 }
 
-/* v += E y. */
-static void spread(const blw_l1_t *self, size_t count, const blw_real_t *y, blw_real_t *v)
+void blw_l1_newton_spread(const blw_l1_t *self, size_t count, const blw_real_t *y, blw_real_t *v)
 {
     for (size_t q = 0U; q < count; q++) {
         size_t i;
@@ -137,7 +135,7 @@ static size_t add_rows(const blw_l1_newton_t *at, size_t g, size_t r)
     }
     for (size_t k = 0U; k < size; k++) {
         blw_real_t *const row = blw_l1_row_of_L(self, r + k);
-        gather(self, r + k + 1U, &m->W[blw_la_packed_row(i + k)], 1U, row);
+        blw_l1_newton_gather(self, r + k + 1U, &m->W[blw_la_packed_row(i + k)], 1U, row);
         row[r + k] += share(at, g);
     }
     return size;
@@ -155,7 +153,7 @@ static BLW_APART void build(const blw_l1_newton_t *at)
     }
     for (size_t k = 0U; k < m->n; k++) {
         blw_real_t *const Lr = blw_l1_row_of_L(self, at->free + k);
-        gather(self, at->free, &m->G[k], m->n, Lr);
+        blw_l1_newton_gather(self, at->free, &m->G[k], m->n, Lr);
         blw_la_fill(k + 1U, BLW_R(0.0), &Lr[at->free]);
         Lr[at->free + k] = -DAMPING / m->P[blw_la_packed_row(k) + k];
     }
@@ -193,8 +191,8 @@ static BLW_APART void solve_system(blw_l1_newton_t *at, blw_real_t *l)
 {
     blw_l1_t *const self = at->l1;
 
-    blw_l1_solve_LJL(self, at->free, at->free + self->model->n);
-    spread(self, at->free, self->step, l);
+    blw_l1_solve_LJL(self, at->free, at->free + self->model->n, self->step);
+    blw_l1_newton_spread(self, at->free, self->step, l);
     blw_la_copy(self->model->n, &self->step[at->free], self->step);
 }
 
@@ -234,17 +232,33 @@ blw_real_t blw_l1_newton_residual(const blw_l1_newton_t *at)
     return worst;
 }
 
+size_t blw_l1_newton_column(const blw_l1_newton_t *at, size_t row)
+{
+    size_t q = 0U;
+    size_t i;
+
+    while (turned(at->l1, q, &i) || (i != row)) {
+        q++;
+    }
+    return q;
+}
+
+void blw_l1_newton_factor(blw_l1_newton_t *at)
+{
+    at->free = list_columns(at->l1);
+    build(at);
+    at->weak = blw_l1_factor(at->l1, at->free, at->free + at->l1->model->n, PIVOT2_MIN);
+}
+
 void blw_l1_newton_step(blw_l1_newton_t *at)
 {
     blw_l1_t *const             self = at->l1;
     const blw_l1_model_t *const m    = self->model;
 
-    at->free = list_columns(self);
-    build(at);
-    at->weak = blw_l1_factor(self, at->free, at->free + m->n, PIVOT2_MIN);
+    blw_l1_newton_factor(at);
     take_known(self, self->z);
     residual(at, self->z, self->step);
-    gather(self, at->free, self->step, 1U, self->step);
+    blw_l1_newton_gather(self, at->free, self->step, 1U, self->step);
     blw_l1_imbalance(m, self->z, &self->step[at->free]);
     solve_system(at, self->z);
     blw_la_axpy(m->n, BLW_R(1.0), self->step, at->x);

@@ -53,7 +53,7 @@ static void spread(const blw_l1_model_t *m, const blw_real_t *h, blw_real_t *out
         m->fast->spread(m->F, h, out);
         return;
     }
-    blw_la_fill(m->N, BLW_R(0.0), out);
+    blw_la_zero(m->N, out);
     for (size_t j = 0U; j < m->n; j++) {
         blw_la_axpy(m->N, h[j], &m->F[j * m->N], out);
     }

@@ -4,6 +4,7 @@
  * is the Hessian of (2) in blw_l1.h on A.  Without pairs H changes by one row at a time, and L with
  * it.  The residual c dir - l of a Newton step is always formed from Z, never from H, so an error
  * in L slows convergence and does no other harm. */
+#include "blw_cold.h"
 #include "blw_l1_internal.h"
 
 /* Least pivot: a row of Z has unit norm, so below it the row depends on those before it.  The step
@@ -65,7 +66,7 @@ static void extend(blw_l1_t *self, size_t i)
     blw_la_solve_lower(k, self->L, h);
     blw_la_copy(k, h, self->step);
     blw_la_solve_lower_t(k, self->L, self->step);
-    blw_la_fill(self->model->d, BLW_R(0.0), self->dz);
+    blw_la_zero(self->model->d, self->dz);
     blw_la_copy(len, v, self->dz);
     add_rows(self, k, self->step, BLW_R(-1.0), self->dz);
     h[k] = blw_la_max(blw_la_norm(self->model->d, self->dz), PIVOT_MIN);
@@ -132,7 +133,7 @@ void blw_l1_support_drop(blw_l1_t *self, const blw_real_t *zeta, size_t k)
 }
 
 /* Row r of H in (1) up to the diagonal: row i of Z, of group g. */
-static void hessian_row(const blw_l1_t *self, size_t r, size_t i, blw_real_t *H)
+static BLW_APART void hessian_row(const blw_l1_t *self, size_t r, size_t i, blw_real_t *H)
 {
     cursor_t                at = {0U, 0U};
     size_t                  len;
@@ -183,7 +184,7 @@ void blw_l1_support_newton(blw_l1_t *self)
     }
     blw_la_solve_lower(self->rows, self->L, self->step);
     blw_la_solve_lower_t(self->rows, self->L, self->step);
-    blw_la_fill(m->d, BLW_R(0.0), self->dz);
+    blw_la_zero(m->d, self->dz);
     add_rows(self, self->rows, self->step, BLW_R(1.0), self->dz);
 }
 

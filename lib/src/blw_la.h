@@ -10,16 +10,14 @@
 
 #ifdef BLW_REAL_DOUBLE
 #define BLW_LA_SQRT sqrt
-#define BLW_LA_ABS  fabs
 #else
 #define BLW_LA_SQRT sqrtf
-#define BLW_LA_ABS  fabsf
 #endif
 
 /** |a|: one instruction, not a call, on every target. */
 static inline blw_real_t blw_la_abs(blw_real_t a)
 {
-    return BLW_LA_ABS(a);
+    return BLW_REAL_ABS(a);
 }
 
 /** The larger one; a if one of them is NaN. */
@@ -61,12 +59,16 @@ bool blw_la_finite(size_t n, const blw_real_t *x);
 bool blw_la_bounded(size_t n, const blw_real_t *x);
 /** y = x */
 void blw_la_copy(size_t n, const blw_real_t *x, blw_real_t *y);
+/** x = 0 */
+void blw_la_zero(size_t n, blw_real_t *x);
 /** x = (value, ..., value) */
 void blw_la_fill(size_t n, blw_real_t value, blw_real_t *x);
 /** a' b */
 blw_real_t blw_la_dot(size_t n, const blw_real_t *a, const blw_real_t *b);
 /** y = y + alpha x, in place */
 void blw_la_axpy(size_t n, blw_real_t alpha, const blw_real_t *x, blw_real_t *y);
+/** y = a + b */
+void blw_la_sum(size_t n, const blw_real_t *a, const blw_real_t *b, blw_real_t *y);
 /** y = A x, A [rows x cols] */
 void blw_la_gemv(size_t rows, size_t cols, const blw_real_t *A, const blw_real_t *x, blw_real_t *y);
 /** y = y + A x, A [rows x cols], in place */

@@ -98,7 +98,7 @@ BLW_COLD blw_status_t blw_lasso_reset(blw_lasso_t *self, const blw_real_t *x0)
         return BLW_ERR_ARG;
     }
     blw_la_copy(plant->n, start, self->x_hat);
-    blw_la_fill(self->model->l1->N, BLW_R(0.0), self->zeta);
+    blw_la_zero(self->model->l1->N, self->zeta);
     blw_l1_reset(&self->l1);
     return BLW_OK;
 }
@@ -130,7 +130,7 @@ static BLW_APART blw_mask_t transform_filters(blw_lasso_t *self, blw_mask_t used
     }
     for (size_t i = 0U; i < jordan->m; i++) {
         if (!transform_sensor(self, i)) {
-            blw_la_fill(r, BLW_R(0.0), &self->zeta[i * r]);
+            blw_la_zero(r, &self->zeta[i * r]);
             (void)transform_sensor(self, i);
             taken &= ~((blw_mask_t)1U << i);
         }
@@ -194,17 +194,16 @@ static blw_outcome_t outcome_of(const blw_l1_info_t *info)
 static BLW_APART void report(const blw_lasso_t *self, const blw_l1_info_t *info, blw_mask_t used,
                              blw_estimator_out_t *out)
 {
-    *out = (blw_estimator_out_t){
-        .x_hat      = self->x_hat,
-        .suspicion  = self->suspicion,
-        .statistic  = info->statistic,
-        .threshold  = BLW_R(1.0),
-        .bound      = info->bound,
-        .used       = used,
-        .iterations = info->iterations,
-        .outcome    = (uint8_t)outcome_of(info),
-        .flags      = blw_step_flags(self->model->head.plant, used, 0U),
-    };
+    out->x_hat      = self->x_hat;
+    out->suspicion  = self->suspicion;
+    out->statistic  = info->statistic;
+    out->threshold  = BLW_R(1.0);
+    out->bound      = info->bound;
+    out->excluded   = 0U;
+    out->used       = used;
+    out->iterations = info->iterations;
+    out->outcome    = (uint8_t)outcome_of(info);
+    out->flags      = blw_step_flags(self->model->head.plant, used, 0U);
     if ((self->model->ambiguous != 0U) && !info->kalman) {
         out->flags = (uint8_t)(out->flags | BLW_FLAG_AMBIGUOUS);
     }

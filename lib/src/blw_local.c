@@ -41,7 +41,7 @@ BLW_COLD blw_status_t blw_local_reset(blw_local_t *self, const blw_real_t *x_hat
     }
     blw_la_copy(plant->n, start, self->x_hat);
     blw_la_copy(plant->n, start, self->x_bar);
-    blw_la_fill(self->model->jordan->r, BLW_R(0.0), self->zeta);
+    blw_la_zero(self->model->jordan->r, self->zeta);
     return BLW_OK;
 }
 
@@ -74,7 +74,7 @@ bool blw_local_step(blw_local_t *self, const blw_real_t *u, blw_real_t y, bool v
     }
     blw_jordan_step_sensor(self->model->jordan, i, NULL, e, self->zeta);
     if (!in_bounds(self)) {
-        blw_la_fill(self->model->jordan->r, BLW_R(0.0), self->zeta);
+        blw_la_zero(self->model->jordan->r, self->zeta);
         return false;
     }
     return used;

@@ -86,7 +86,7 @@ class CLibrary:
         for struct in (plant, designed.tables):
             for values in struct.reals():
                 crc = zlib.crc32(values.astype(self.dtype).tobytes(), crc)
-        self.model.head.abi = 0x0100 + ct.sizeof(self.real)
+        self.model.head.abi = 0x0200 + ct.sizeof(self.real)
         self.model.head.method, self.model.head.crc = method, crc
         self.model.head.plant = ct.pointer(self.plant)
         self.out = self.types["out"]()

@@ -61,6 +61,7 @@ int main(void)
             || (memcmp(a.x_hat, b.x_hat, UPPER_N * sizeof u[0]) != 0) || (a.used != b.used)
             || (memcmp(a.suspicion, b.suspicion, UPPER_M * sizeof u[0]) != 0)
             || (memcmp(&a.bound, &b.bound, sizeof a.bound) != 0)
+            || (memcmp(&a.statistic, &b.statistic, sizeof a.statistic) != 0)
             || (a.iterations != b.iterations) || (a.flags != b.flags)) {
             differ++;
         }
@@ -95,7 +96,8 @@ def compare(folder: Path, made: design.Design, method: str, width: str) -> str:
     text = text.replace(f"BLW_{name.upper()}_{method}_", f"BLW_{name.upper()}_{method.upper()}_")
     (folder / "main.c").write_text(text)
     modules = ["la", "model", "step", "kalman", "jordan", "lasso", "l1", "l1_active_set", "l1_admm",
-               "l1_factor", "l1_kkt", "l1_newton", "l1_newton_start", "l1_newton_step", "l1_refine",
+               "l1_factor", "l1_kkt", "l1_newton", "l1_newton_finish", "l1_newton_start",
+               "l1_newton_step", "l1_refine",
                "l1_support", "l1_tableau"]
     library = ROOT / "lib" / "src"
     sources = [*(library / f"blw_{module}.c" for module in modules), *library.glob("blw_guard*.c")]

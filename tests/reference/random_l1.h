@@ -15,6 +15,38 @@ namespace reference
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
+// Every kind of expression compiles a kernel of its own, and for seconds: these few are enough.
+inline Vector applied(const Matrix &A, const Vector &x)
+{
+    return A * x;
+}
+
+inline Matrix times(const Matrix &A, const Matrix &B)
+{
+    return A * B;
+}
+
+inline Matrix transposed(const Matrix &A)
+{
+    return A.transpose();
+}
+
+inline Matrix inverse(const Matrix &A)
+{
+    return A.inverse();
+}
+
+// diag(s) A
+inline Matrix scaled(const Vector &s, const Matrix &A)
+{
+    return s.asDiagonal() * A;
+}
+
+inline Matrix square(const Matrix &A)
+{
+    return times(A, transposed(A));
+}
+
 // The tables of one instance of (1) in blw_l1.h, in double and as the library takes them.
 class Problem
 {
@@ -31,7 +63,8 @@ public:
         }
         G_             = normal(N_, n);
         const Matrix X = normal(N_, N_);
-        W_             = X * X.transpose() / N_ + least * Matrix::Identity(N_, N_);
+        W_             = square(X) / N_;
+        W_.diagonal().array() += least;
         reduce();
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             c_(g) = threshold * (1.0 + 0.3 * std::abs(normal(1, 1)(0)));
@@ -66,7 +99,8 @@ public:
     Vector sample(double attack)
     {
         const Eigen::LLT<Matrix> W(W_);
-        Vector                   zeta = G_ * normal(n_, 1) + W.matrixL() * normal(N_, 1);
+        Vector                   zeta = applied(G_, normal(n_, 1));
+        zeta += applied(W.matrixL(), normal(N_, 1));
         zeta.head(N_ / 4) += attack * normal(N_ / 4, 1);
         return zeta;
     }
@@ -74,13 +108,13 @@ public:
     // (2) by ADMM in double, started cold: an algorithm and a linear algebra of its own.
     Vector solve(const Vector &zeta, int passes) const
     {
-        const Matrix             S   = Z_ * Z_.transpose();
-        const double             rho = 0.3;
-        const Eigen::LLT<Matrix> M(S + rho * Matrix::Identity(N_, N_));
-        Vector                   t = Vector::Zero(N_);
-        Vector                   u = Vector::Zero(N_);
+        const double rho = 0.3;
+        const Matrix M   = regularised_inverse(rho);
+        const Vector Sz  = applied(square(Z_), zeta);
+        Vector       t   = Vector::Zero(N_);
+        Vector       u   = Vector::Zero(N_);
         for (int pass = 0; pass < passes; ++pass) {
-            const Vector nu = M.solve(S * zeta + rho * (t - u));
+            const Vector nu = applied(M, Sz + rho * (t - u));
             const Vector v  = 1.6 * nu - 0.6 * t + u;
             for (Eigen::Index g = 0; g < c_.size(); ++g) {
                 const auto   rows = v.segment(first(g), size(g));
@@ -90,14 +124,14 @@ public:
             }
             u = v - t;
         }
-        return F_ * (zeta - t);
+        return applied(F_, zeta - t);
     }
 
     // Largest violation of the optimality conditions (4), relative to c_g, for nu = zeta - tau.
     double violation(const Vector &zeta, const Vector &tau) const
     {
         const Vector nu    = zeta - tau;
-        const Vector l     = Z_ * (Z_.transpose() * tau);
+        const Vector l     = applied(square(Z_), tau);
         double       worst = 0.0;
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             const Vector l_g  = l.segment(first(g), size(g));
@@ -114,7 +148,7 @@ public:
     double objective(const Vector &zeta, const Vector &tau) const
     {
         const Vector nu  = zeta - tau;
-        double       sum = 0.5 * (Z_.transpose() * tau).squaredNorm();
+        double       sum = 0.5 * applied(transposed(Z_), tau).squaredNorm();
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             sum += c_(g) * nu.segment(first(g), size(g)).norm();
         }
@@ -158,7 +192,7 @@ public:
     }
     Vector kalman(const Vector &zeta) const
     {
-        return F_ * zeta;
+        return applied(F_, zeta);
     }
 
 private:
@@ -178,9 +212,17 @@ private:
             const double width = std::sqrt(W_(first(g), first(g)));
             K.diagonal().segment(first(g), size(g)).array() += 0.3 * width / c_(g);
         }
-        K               = K.inverse().eval();
-        const Matrix KG = K * G_;
-        return K - KG * (G_.transpose() * KG).inverse() * KG.transpose();
+        K               = inverse(K);
+        const Matrix KG = times(K, G_);
+        return K - times(KG, times(inverse(times(transposed(G_), KG)), transposed(KG)));
+    }
+
+    // (S + rho I)^-1
+    Matrix regularised_inverse(double rho) const
+    {
+        Matrix S = square(Z_);
+        S.diagonal().array() += rho;
+        return inverse(S);
     }
 
     Eigen::Index first(Eigen::Index g) const
@@ -195,25 +237,26 @@ private:
     // Z, F for rows scaled so that Z Z' has unit mean square over every group.
     void reduce()
     {
-        const Matrix Winv = W_.inverse();
-        const Matrix P    = (G_.transpose() * Winv * G_).inverse();
-        const Matrix S    = Winv - Winv * G_ * P * G_.transpose() * Winv;
+        const Matrix Winv = inverse(W_);
+        const Matrix WG   = times(Winv, G_);
+        const Matrix P    = inverse(times(transposed(G_), WG));
+        const Matrix S    = Winv - times(WG, times(P, transposed(WG)));
         Vector       s(N_);
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             const double trace = S.diagonal().segment(first(g), size(g)).sum();
             s.segment(first(g), size(g)).setConstant(std::sqrt(trace / double(size(g))));
         }
         const Eigen::SelfAdjointEigenSolver<Matrix> eigen(S);
-        const int                                   d    = N_ - n_;
-        const Matrix                                root = eigen.eigenvectors().rightCols(d)
-                            * eigen.eigenvalues().tail(d).cwiseSqrt().asDiagonal();
-        const Matrix                       scaled = s.cwiseInverse().asDiagonal() * root;
-        const Eigen::HouseholderQR<Matrix> qr(scaled.topRows(d).transpose());
-        const Matrix                       Q = qr.householderQ();
-        Z_                                   = scaled * Q;
-        G_                                   = s.asDiagonal() * G_;
-        W_                                   = s.asDiagonal() * W_ * s.asDiagonal();
-        F_                                   = P * G_.transpose() * W_.inverse();
+        const int                                   d       = N_ - n_;
+        const Matrix                                vectors = eigen.eigenvectors().rightCols(d);
+        const Vector                                roots = eigen.eigenvalues().tail(d).cwiseSqrt();
+        const Matrix                                root =
+            scaled(s.cwiseInverse(), transposed(scaled(roots, transposed(vectors))));
+        const Eigen::HouseholderQR<Matrix> qr(Matrix(transposed(root.topRows(d))));
+        Z_ = times(root, Matrix(qr.householderQ()));
+        G_ = scaled(s, G_);
+        W_ = scaled(s, transposed(scaled(s, W_)));
+        F_ = times(P, times(transposed(G_), inverse(W_)));
     }
 
     // Lower triangle, packed by rows.
@@ -239,7 +282,7 @@ private:
                 Z_table_.push_back(static_cast<blw_real_t>(Z_(i, j)));
             }
         }
-        const Matrix M = (Z_ * Z_.transpose() + 0.3 * Matrix::Identity(N_, N_)).inverse();
+        const Matrix M = regularised_inverse(0.3);
         for (int i = 0; i < N_; ++i) {
             for (int j = 0; j <= i; ++j) {
                 M_table_.push_back(static_cast<blw_real_t>(M(i, j)));
@@ -255,19 +298,20 @@ private:
                 G_table_.push_back(static_cast<blw_real_t>(G_(i, j)));
             }
         }
-        S_table_        = lower(Z_ * Z_.transpose());
+        S_table_        = lower(square(Z_));
         smoothed_table_ = lower(smoothed());
         W_table_        = lower(W_);
-        P_table_        = lower(F_ * W_ * F_.transpose());
+        P_table_        = lower(times(F_, times(W_, transposed(F_))));
         Vector rows_c(N_);
         for (Eigen::Index g = 0; g < c_.size(); ++g) {
             c_table_.push_back(static_cast<blw_real_t>(c_(g)));
             rows_c.segment(first(g), size(g)).setConstant(c_(g));
         }
-        const Matrix                                cG  = rows_c.asDiagonal() * G_;
-        const Matrix                                cWZ = rows_c.asDiagonal() * W_ * Z_;
-        const Eigen::SelfAdjointEigenSolver<Matrix> squares_G(cG.transpose() * cG);
-        const Eigen::SelfAdjointEigenSolver<Matrix> squares_W(cWZ.transpose() * cWZ);
+        const Matrix cG  = transposed(scaled(rows_c, G_));
+        const Matrix cWZ = transposed(scaled(rows_c, times(W_, Z_)));
+
+        const Eigen::SelfAdjointEigenSolver<Matrix> squares_G(square(cG));
+        const Eigen::SelfAdjointEigenSolver<Matrix> squares_W(square(cWZ));
         kappa_G_ = 1.0 / std::sqrt(squares_G.eigenvalues().minCoeff());
         kappa_W_ = std::sqrt(double(c_.size()) * squares_W.eigenvalues().maxCoeff());
     }

@@ -128,6 +128,10 @@ void vectors(std::size_t n)
     check_vector(ea, y);
     blw_la_fill(n, alpha, y.data());
     check_vector(Vector::Constant(static_cast<Eigen::Index>(n), alpha), y);
+    blw_la_sum(n, a.data(), b.data(), y.data());
+    check_vector(ea + eb, y);
+    blw_la_zero(n, y.data());
+    check_vector(Vector::Zero(static_cast<Eigen::Index>(n)), y);
 }
 
 void products(std::size_t rows, std::size_t cols)

@@ -4,6 +4,7 @@
 #include "support.h"
 
 #include "blw/blw_l1.h"
+#include "blw/blw_l1_survey.h"
 #include "blw_l1_internal.h"
 
 /* (S + rho I)^-1 for S = I - 1 1'/3, rho = 1/2: 2/3 I + 4/9 1 1', packed lower. */
@@ -123,6 +124,24 @@ static void test_solve_given_nan_certifies_nothing(void)
     TEST_ASSERT_REAL_WITHIN(0.0, BLW_REAL_MAX, info.bound);
 }
 
+static void test_larger_given_a_smaller_ratio_keeps_the_other(void)
+{
+    TEST_ASSERT_REAL_WITHIN(0.0, 2.0, blw_l1_larger(BLW_R(2.0), BLW_R(6.0), BLW_R(3.0)));
+    TEST_ASSERT_REAL_WITHIN(0.0, 2.5, blw_l1_larger(BLW_R(2.0), BLW_R(7.5), BLW_R(3.0)));
+}
+
+static void test_larger_given_what_is_not_finite_keeps_it(void)
+{
+    const blw_real_t bad[2] = {support_nan, support_inf};
+
+    for (size_t k = 0U; k < 2U; k++) {
+        const blw_real_t most = blw_l1_larger(BLW_R(2.0), bad[k], BLW_R(3.0));
+        TEST_ASSERT_FALSE(most <= BLW_REAL_MAX);
+        TEST_ASSERT_FALSE(blw_l1_larger(most, BLW_R(7.5), BLW_R(3.0)) <= BLW_REAL_MAX);
+        TEST_ASSERT_FALSE(blw_l1_larger(most, bad[1U - k], BLW_R(3.0)) <= BLW_REAL_MAX);
+    }
+}
+
 static void test_excess_given_an_outlier_names_its_row(void)
 {
     const blw_real_t zeta[3] = {BLW_R(4.0), BLW_R(5.0), BLW_R(90.0)};
@@ -206,12 +225,11 @@ static void give_up(blw_l1_t *self, const blw_real_t *zeta, blw_real_t *x_hat, b
     told->iterations = 7U;
 }
 
-static void give_up_with(blw_real_t tau)
+static void give_up_with(const blw_real_t *zeta, blw_real_t tau)
 {
-    const blw_l1_ops_t engine  = {.fits     = blw_l1_active_set_ops.fits,
-                                  .multiply = blw_l1_active_set_ops.multiply,
-                                  .solve    = give_up};
-    const blw_real_t   zeta[3] = {BLW_R(4.0), BLW_R(5.0), BLW_R(90.0)};
+    const blw_l1_ops_t engine = {.fits     = blw_l1_active_set_ops.fits,
+                                 .multiply = blw_l1_active_set_ops.multiply,
+                                 .solve    = give_up};
 
     left_behind    = tau;
     made.l1.engine = &engine;
@@ -222,20 +240,34 @@ static void give_up_with(blw_real_t tau)
     TEST_ASSERT_TRUE(info.bound >= BLW_R(0.0));
 }
 
+static const blw_real_t outlier[3] = {BLW_R(4.0), BLW_R(5.0), BLW_R(90.0)};
+
 static void test_solve_given_an_engine_led_astray_returns_the_linear_fusion(void)
+{
+    const blw_real_t astray[3] = {BLW_R(1e6), BLW_R(-1e6), support_nan};
+    const blw_real_t far[3]    = {BLW_R(42.0), BLW_R(43.0), BLW_R(47.0)};
+
+    for (size_t i = 0U; i < 3U; i++) {
+        give_up_with(far, astray[i]); /* 1/2 |z|^2 = 7 is less than 132 for nu = zeta */
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 22.0, x[0]); /* mean 44 */
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 47.0, l1.tau[2]);
+    }
+}
+
+static void test_solve_given_an_engine_led_astray_by_an_outlier_keeps_the_reference(void)
 {
     const blw_real_t astray[3] = {BLW_R(1e6), BLW_R(-1e6), support_nan};
 
     for (size_t i = 0U; i < 3U; i++) {
-        give_up_with(astray[i]);
-        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 16.5, x[0]); /* mean 33 */
-        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 90.0, l1.tau[2]);
+        give_up_with(outlier, astray[i]); /* 99 for nu = zeta is less than 1/2 |z|^2 = 2437 */
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, x[0]);
+        TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, l1.tau[2]);
     }
 }
 
 static void test_solve_given_an_engine_cut_short_keeps_what_is_better(void)
 {
-    give_up_with(BLW_R(6.0)); /* 84 + 1 instead of 1/2 |z|^2 = 2437 */
+    give_up_with(outlier, BLW_R(6.0)); /* 84 + 1 is less than either */
     TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 2.5, x[0]);
 }
 
@@ -249,11 +281,14 @@ int main(void)
     RUN_TEST(test_solve_given_the_next_sample_starts_from_the_support);
     RUN_TEST(test_solve_given_too_few_iterations_says_so_with_a_bound);
     RUN_TEST(test_solve_given_nan_certifies_nothing);
+    RUN_TEST(test_larger_given_a_smaller_ratio_keeps_the_other);
+    RUN_TEST(test_larger_given_what_is_not_finite_keeps_it);
     RUN_TEST(test_excess_given_an_outlier_names_its_row);
     RUN_TEST(test_check_given_a_sound_model_accepts_both_engines);
     RUN_TEST(test_check_given_each_fault_refuses);
     RUN_TEST(test_check_given_no_model_refuses);
     RUN_TEST(test_solve_given_an_engine_led_astray_returns_the_linear_fusion);
+    RUN_TEST(test_solve_given_an_engine_led_astray_by_an_outlier_keeps_the_reference);
     RUN_TEST(test_solve_given_an_engine_cut_short_keeps_what_is_better);
     return UNITY_END();
 }

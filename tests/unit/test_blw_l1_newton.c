@@ -120,6 +120,23 @@ static void test_solve_given_a_gross_outlier_loses_no_accuracy(void)
     check_attacked(zeta);
 }
 
+/* Whatever their size, outliers pull x by no more than their bound. */
+static void test_solve_given_outliers_that_grow_and_vanish_finds_each_minimum(void)
+{
+    const blw_real_t sizes[] = {BLW_R(1.0), BLW_R(50.0),  BLW_R(2e3),
+                                BLW_R(1.0), BLW_R(300.0), BLW_R(10.0)};
+
+    for (size_t k = 0U; k < (sizeof sizes / sizeof sizes[0]); k++) {
+        blw_real_t zeta[N];
+        blw_la_copy(N, attacked, zeta);
+        zeta[6] *= sizes[k];
+        zeta[7] *= sizes[k];
+        zeta[8] *= sizes[k];
+        check_attacked(zeta);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(16U, info.iterations);
+    }
+}
+
 static void test_solve_given_the_same_data_after_a_reset_gives_the_same_bits(void)
 {
     blw_real_t before[STATES];
@@ -165,6 +182,28 @@ static void test_solve_given_an_attack_that_has_ended_starts_afresh(void)
     blw_l1_solve(&l1, zeta, x, &info);
     TEST_ASSERT_TRUE(info.converged);
     TEST_ASSERT_EQUAL_MEMORY(fresh, x, sizeof x);
+}
+
+/* Minima with nu_g = 0 and |l_g| = c_g at once, far from 0: rounding must not keep them open. */
+static void test_solve_given_groups_on_the_verge_certifies(void)
+{
+    static const blw_real_t verge[][N] = {
+        {BLW_R(-26.1682186), BLW_R(202.061554), BLW_R(212.189911), BLW_R(-25.1033382),
+         BLW_R(206.954407), BLW_R(207.18251), BLW_R(-25.316), BLW_R(205.977295), BLW_R(208.18251)},
+        {BLW_R(-300.717316), BLW_R(305.575104), BLW_R(347.324554), BLW_R(-292.629181),
+         BLW_R(306.041077), BLW_R(339.223022), BLW_R(-293.627533), BLW_R(305.983582),
+         BLW_R(340.223022)},
+        {BLW_R(7.96984482), BLW_R(326.595398), BLW_R(92.2977753), BLW_R(8.41116428),
+         BLW_R(324.920502), BLW_R(90.2977753), BLW_R(9.64099693), BLW_R(326.140167),
+         BLW_R(91.2977753)},
+    };
+
+    for (size_t k = 0U; k < (sizeof verge / sizeof verge[0]); k++) {
+        blw_l1_solve(&l1, verge[k], x, &info);
+        TEST_ASSERT_TRUE(info.converged);
+        TEST_ASSERT_FALSE(info.kalman);
+        TEST_ASSERT_LESS_OR_EQUAL_UINT16(16U, info.iterations);
+    }
 }
 
 static void test_solve_given_too_few_steps_says_so_with_a_bound(void)
@@ -239,9 +278,11 @@ int main(void)
     RUN_TEST(test_solve_given_agreeing_rows_returns_the_linear_fusion);
     RUN_TEST(test_solve_given_outliers_clips_pair_and_row);
     RUN_TEST(test_solve_given_a_gross_outlier_loses_no_accuracy);
+    RUN_TEST(test_solve_given_outliers_that_grow_and_vanish_finds_each_minimum);
     RUN_TEST(test_solve_given_the_same_data_after_a_reset_gives_the_same_bits);
     RUN_TEST(test_solve_given_an_attack_that_lasts_takes_fewer_steps);
     RUN_TEST(test_solve_given_an_attack_that_has_ended_starts_afresh);
+    RUN_TEST(test_solve_given_groups_on_the_verge_certifies);
     RUN_TEST(test_solve_given_too_few_steps_says_so_with_a_bound);
     RUN_TEST(test_solve_given_a_singular_W_does_not_certify);
     RUN_TEST(test_solve_given_a_table_that_is_not_a_number_does_not_certify);

@@ -35,6 +35,9 @@ NEWTON = Link("blw_l1_newton_ops", "newton")
 #: Part of a row's information that is redundant; below this it is rounding.
 _NOT_REDUNDANT = 1e-12
 
+#: What it may leave of a one.
+_ROUNDING = 1e-12
+
 #: A row is a combination of others if no more than this part of it is left.
 _DEPENDENT = 1e-9
 
@@ -87,8 +90,11 @@ class Reduced:
 
     @property
     def S(self) -> Array:
-        """[N x N] covariance of l without attack."""
-        return self.Z @ self.Z.T
+        """[N x N] covariance of l without attack; 1 is exact on the diagonal."""
+        S = self.Z @ self.Z.T
+        ones = np.flatnonzero(np.abs(np.diag(S) - 1.0) < _ROUNDING)
+        S[ones, ones] = 1.0
+        return S
 
     @property
     def unchecked(self) -> Array:
@@ -277,7 +283,8 @@ def struct(
             "G": table(reduced_form.H, f"[{N} x {F.shape[0]}]") if in_W else None,
             "P": table(pack_lower(scaled_F @ reduced_form.W @ scaled_F.T), "[n(n+1)/2] F W F'")
             if in_W else None,
-            "fast": l1_straight.kernels(f"{suffix}_fast", N, F.shape[0]) if tableau else None,
+            "fast": l1_straight.kernels(f"{suffix}_fast", reduced_form.S, F.shape[0])
+            if tableau else None,
             "rho": real(engine.rho),
             "kappa_G": real(kappa_G),
             "kappa_W": real(kappa_W),

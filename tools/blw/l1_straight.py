@@ -16,17 +16,65 @@ from blw.tables import Code, Struct
 #: Most rows of zeta: beyond, the loops cost little more and far less flash.
 MOST_ROWS = 16
 
+#: Of the rows of a product with S: whose sums, and zeta, the registers have room for.
+FIRST_PART = 0.4
+
 PASS_ON = "/* fall through */"
 
 
-def kernels(suffix: str, N: int, n: int) -> Struct | None:
-    """blw_l1_kernels_t, or None where the loops serve better."""
+def kernels(suffix: str, S: NDArray[np.float64], n: int) -> Struct | None:
+    """blw_l1_kernels_t for S [N x N], or None where the loops serve better."""
+    N = len(S)
     if N > MOST_ROWS:
         return None
-    members = {"symv": symv(N), "column": column(N), "sweep": sweep(N),
+    members = {"certify": certify(S, n), "symv": symv(N), "column": column(N), "sweep": sweep(N),
                "fuse": fuse(n, N), "spread": spread(n, N), "predict": predict(n, N),
                "balance": balance(n, N)}
     return Struct("blw_l1_kernels_t", suffix, members)
+
+
+def certify(S: NDArray[np.float64], n: int) -> Code:
+    """blw_l1_certify_kernel_t: all of a step where nu = 0 is optimal.
+
+    Every S_ij is loaded once, for l_i and l_j, a diagonal element of 1 not at all, and every zeta_i
+    once for all that it goes into.  The sums of the first rows stay in registers while these meet
+    the others; more rows than FIRST_PART have no room there.
+    """
+    N = len(S)
+    first = round(FIRST_PART * N)
+    unit = [bool(value == 1.0) for value in np.diag(S)]
+    lines = ["const blw_l1_model_t *const m = self->model;", "const blw_real_t *const S = m->S;",
+             "const blw_real_t *const F = m->F;", "const blw_real_t *const c = m->c;",
+             "blw_real_t *const tau = self->tau;", "blw_real_t *const l = self->l;",
+             "blw_real_t most = BLW_R(0.0);", ""]
+    for i in range(N):
+        lines += [f"const blw_real_t x{i} = zeta[{i}];", f"tau[{i}] = x{i};"]
+        lines += [grown(f"s{j}", i, f"F[{j * N + i}] * x{i};") for j in range(n)]
+        if i < first:
+            lines += [*statement(f"blw_real_t y{i} =", row(i, range(i + 1), "x", unit[i]) + ";"),
+                      *meeting(i, range(i), "x", "y")]
+    lines += [f"x[{j}] = s{j};" for j in range(n)]
+    for j in range(first):
+        for i in range(first, N):
+            lines += [grown(f"y{i}", j, f"S[{at(i, j)}] * x{j};"), *meeting(i, [j], "x", "y")]
+        lines += found(j)
+    for i in range(first, N):
+        lines += statement(f"y{i} = y{i} +", row(i, range(first, i + 1), "x", unit[i]) + ";")
+        lines += meeting(i, range(first, i), "x", "y")
+    lines += [line for i in range(first, N) for line in found(i)]
+    given = "const struct blw_l1 *self, const blw_real_t *zeta,\n    blw_real_t *x"
+    return Code("blw_real_t", given, (*lines, "return most;"),
+                f"l = S zeta, x = F zeta: {N * (N + n)} multiply-adds")
+
+
+def grown(name: str, before: int, term: str) -> str:
+    """The sum `name` plus the term behind so many others."""
+    return f"{name} += {term}" if before else f"blw_real_t {name} = {term}"
+
+
+def found(i: int) -> list[str]:
+    """l_i is known."""
+    return [f"l[{i}] = y{i};", f"most = blw_l1_larger(most, BLW_REAL_ABS(y{i}), c[{i}]);"]
 
 
 def symv(N: int) -> Code:
@@ -54,12 +102,13 @@ def symv(N: int) -> Code:
                 f"y = S x: {N * N} multiply-adds")
 
 
-def row(i: int, columns: range, x: str) -> str:
-    """What row i of S gives y_i in these columns."""
-    return " + ".join(f"(S[{at(i, j)}] * {x}{j})" for j in columns)
+def row(i: int, columns: range, x: str, unit: bool = False) -> str:
+    """What row i of S gives y_i in these columns; unit: S_ii = 1."""
+    return " + ".join(f"{x}{j}" if unit and i == j else f"(S[{at(i, j)}] * {x}{j})"
+                      for j in columns)
 
 
-def meeting(i: int, rows: range, x: str, y: str) -> list[str]:
+def meeting(i: int, rows: Iterable[int], x: str, y: str) -> list[str]:
     """What row i of S, as a column, gives the rows above."""
     return [f"{y}{j} += S[{at(i, j)}] * {x}{i};" for j in rows]
 

@@ -24,7 +24,7 @@ from blw.tables import Struct, table
 Array = NDArray[np.float64]
 
 NAME = "lasso"
-AVERAGES = False
+GAPS = "counted once"
 
 #: Options that choose gamma; at most one is given.
 GAMMA_KEYS = ("gamma", "recovery_probability", "benign_loss")

@@ -43,6 +43,9 @@ typedef struct blw_l1_survey {
     blw_real_t over; /**< > 0 */
 } blw_l1_survey_t;
 
+/** l = S zeta, tau = zeta, x = F zeta.  @return max_g |l_g| / c_g as blw_l1_larger() finds it. */
+typedef blw_real_t (*blw_l1_certify_kernel_t)(const struct blw_l1 *self, const blw_real_t *zeta,
+                                              blw_real_t *x);
 /** y = S x for S [N x N] packed lower. */
 typedef void (*blw_l1_symv_kernel_t)(const blw_real_t *S, const blw_real_t *x, blw_real_t *y);
 /** Column k of the tableau T, [N]. */
@@ -58,6 +61,7 @@ typedef void (*blw_l1_product_kernel_t)(const blw_real_t *M, const blw_real_t *v
 /** Straight-line code for one N and n that the design tool writes: the numbers of the loops; only
  *  the sign of a zero may differ, which no sum that starts from +0 lets through. */
 typedef struct blw_l1_kernels {
+    blw_l1_certify_kernel_t certify;
     blw_l1_symv_kernel_t    symv;
     blw_l1_column_kernel_t  column;
     blw_l1_sweep_kernel_t   sweep;

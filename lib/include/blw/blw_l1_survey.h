@@ -1,12 +1,24 @@
 /* SPDX-License-Identifier: MIT */
-/** @file blw_l1_survey.h  One row of a pass over the tableau of the l1 fusion (blw_l1_tableau.c):
- *  the loop of the library and the straight-line code of a model share it, and so decide alike. */
+/** @file blw_l1_survey.h  One row of a pass over the multipliers or the tableau of the l1 fusion
+ *  (blw_l1.c, blw_l1_tableau.c): the loop of the library and the straight-line code of a model share
+ *  it, and so decide alike. */
 #ifndef BLW_L1_SURVEY_H
 #define BLW_L1_SURVEY_H
+#include <math.h>
 #include "blw/blw_l1.h"
 #ifdef __cplusplus
 extern "C" {
 #endif
+
+/** The larger of `most` and size / c, without a division where that is `most`; once it is not
+ *  finite, a NaN included, it stays. */
+static inline blw_real_t blw_l1_larger(blw_real_t most, blw_real_t size, blw_real_t c)
+{
+    if (size <= (most * c)) {
+        return most;
+    }
+    return (most <= BLW_REAL_MAX) ? (size / c) : most;
+}
 
 /** Least diagonal element of the tableau to divide by: that of S is about 1.  Below it a row
  *  depends on those that are in. */

@@ -8,7 +8,7 @@
  *
  *  BLW_SIGNAL_MAX is the largest magnitude of a sample, an input or a state that a step works with.
  *  Its square, and sums of squares after gains far above 1, are still finite; what is larger is
- *  treated like an infinity, so that no data overflow into a state.
+ *  treated like an infinity, so that no data overflow into a state.  BLW_REAL_ABS is that of math.h.
  */
 #ifndef BLW_REAL_H
 #define BLW_REAL_H
@@ -26,12 +26,14 @@ typedef double blw_real_t;
 #define BLW_R(literal) literal
 #define BLW_REAL_MAX   DBL_MAX
 #define BLW_REAL_EPS   DBL_EPSILON
+#define BLW_REAL_ABS   fabs
 #define BLW_SIGNAL_MAX 1e150
 #else
 typedef float blw_real_t;
 #define BLW_R(literal) literal##F
 #define BLW_REAL_MAX   FLT_MAX
 #define BLW_REAL_EPS   FLT_EPSILON
+#define BLW_REAL_ABS   fabsf
 #define BLW_SIGNAL_MAX 1e15F
 #endif
 
