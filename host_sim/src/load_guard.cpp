@@ -76,6 +76,7 @@ std::unique_ptr<MethodTables> load_guard(TableReader &tables, const blw_plant_t 
     model.drift   = tables.reals("drift", plant.m);
     model.k       = tables.real("k");
     model.exclude = tables.real("exclude");
+    model.gross   = tables.real("gross");
     model.gain    = tables.real("gain");
     model.kappa   = tables.real("kappa");
     model.omega   = tables.real("omega");

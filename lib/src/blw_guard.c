@@ -67,8 +67,8 @@ BLW_COLD blw_status_t blw_guard_reset(blw_guard_t *self, const blw_real_t *x0)
     }
     blw_la_copy(plant->n, start, self->x_ref);
     blw_la_copy(plant->n, start, self->x_hat);
-    blw_la_fill(N, BLW_R(0.0), self->eta);
-    blw_la_fill(N, BLW_R(0.0), self->average);
+    blw_la_zero(N, self->eta);
+    blw_la_zero(N, self->average);
     self->warm_up = self->model->warm_up;
     return BLW_OK;
 }
@@ -107,7 +107,7 @@ static blw_mask_t mend(blw_guard_t *self, blw_mask_t used)
 
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
         if (!blw_la_bounded(r, &self->e[i * r])) {
-            blw_la_fill(r, BLW_R(0.0), &self->e[i * r]);
+            blw_la_zero(r, &self->e[i * r]);
             taken &= ~guard_bit(i);
         }
     }
@@ -122,12 +122,12 @@ static void move_reference(blw_guard_t *self, const blw_real_t *tau)
     const size_t                   n_u   = model->n_u;
     const size_t                   N     = (size_t)model->head.plant->m * model->r;
 
-    blw_la_fill(n, BLW_R(0.0), self->d);
+    blw_la_zero(n, self->d);
     blw_guard_mul(n_u, N, 0U, N, model->Fu, tau, self->d);
-    blw_la_copy(n, self->x_bar, self->x_ref);
     if (n_u == n) {
-        blw_la_axpy(n, BLW_R(1.0), self->d, self->x_ref);
+        blw_la_sum(n, self->x_bar, self->d, self->x_ref);
     } else {
+        blw_la_copy(n, self->x_bar, self->x_ref);
         blw_la_gemv_add(n, n_u, model->Xu, self->d, self->x_ref);
     }
     for (size_t j = 0U; j < n_u; j++) {
@@ -155,7 +155,7 @@ static void fuse(blw_guard_t *self, const blw_real_t *tau)
     }
     blw_la_copy(n, self->x_ref, self->x_hat);
     if (n_s > 0U) {
-        blw_la_fill(n_s, BLW_R(0.0), self->d);
+        blw_la_zero(n_s, self->d);
         blw_guard_mul(n_s, N, 0U, N, model->Sig, self->l, self->d);
         blw_la_gemv_add(n, n_s, model->Xs, self->d, self->x_hat);
     }
@@ -169,8 +169,8 @@ static void restart(blw_guard_t *self)
 
     blw_la_copy(n, self->x_bar, self->x_ref);
     blw_la_copy(n, self->x_bar, self->x_hat);
-    blw_la_fill(N, BLW_R(0.0), self->eta);
-    blw_la_fill(N, BLW_R(0.0), self->average);
+    blw_la_zero(N, self->eta);
+    blw_la_zero(N, self->average);
 }
 
 /* Advance the averages of l. */

@@ -7,6 +7,7 @@
  *     nu_c = g_c / (s_c + mu),   mu |nu| = k,   or nu = 0 if |g| <= k.                       (10)
  * psi(mu) = 1 / |nu| - mu / k is concave, s <= 1, so Newton's method on it decreases monotonically
  * from mu = k / (|g| - k) to the root, two or three steps as a rule. */
+#include "blw_cold.h"
 #include "blw_guard_internal.h"
 #include "blw_la.h"
 
@@ -87,7 +88,7 @@ static void turn_back(size_t r, const blw_real_t *V, const blw_real_t *v, blw_re
 }
 
 /* The step [r] of tau_i to (10), where l_j = 0.  @return whether nu_i /= 0 then. */
-static bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
+static BLW_APART bool step_beside(blw_guard_t *self, size_t i, size_t j, blw_real_t *step)
 {
     const size_t            r      = self->model->r;
     const blw_real_t        k      = self->model->k;

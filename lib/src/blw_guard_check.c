@@ -65,9 +65,9 @@ static bool values_ok(const blw_guard_model_t *model)
             return false;
         }
     }
-    return (model->k > zero) && (model->exclude >= model->k) && (model->gain > zero)
-           && (model->gain <= BLW_R(1.0)) && (model->kappa >= zero) && (model->omega >= zero)
-           && (model->sigma >= zero);
+    return (model->k > zero) && (model->exclude >= model->k) && (model->gross > zero)
+           && (model->gain > zero) && (model->gain <= BLW_R(1.0)) && (model->kappa >= zero)
+           && (model->omega >= zero) && (model->sigma >= zero);
 }
 
 static BLW_COLD void add_tables(const blw_guard_model_t *model, blw_table_check_t *check)
@@ -94,6 +94,7 @@ static BLW_COLD void add_tables(const blw_guard_model_t *model, blw_table_check_
     blw_table_add(check, model->drift, m);
     blw_table_add_real(check, model->k);
     blw_table_add_real(check, model->exclude);
+    blw_table_add_real(check, model->gross);
     blw_table_add_real(check, model->gain);
     blw_table_add_real(check, model->kappa);
     blw_table_add_real(check, model->omega);

@@ -16,7 +16,7 @@ static bool is_checked(const blw_guard_t *self, size_t i, blw_real_t limit)
 blw_mask_t blw_guard_gross(blw_guard_t *self)
 {
     const size_t      m      = self->model->head.plant->m;
-    const blw_real_t  limit  = GUARD_GROSS * self->model->k;
+    const blw_real_t  limit  = self->model->gross;
     blw_real_t *const square = self->suspicion; /* until judge_sensors() */
     blw_mask_t        set    = 0U;
     size_t            count  = 0U;
@@ -40,7 +40,7 @@ void blw_guard_start_without(blw_guard_t *self, blw_mask_t set)
     blw_la_copy(model->head.plant->m * r, self->e, self->eta);
     for (blw_mask_t rest = set; rest != 0U; rest >>= 1) {
         if ((rest & 1U) != 0U) { /* nothing can check the rest of tau_i */
-            blw_la_fill(model->rank[i], BLW_R(0.0), &self->eta[i * r]);
+            blw_la_zero(model->rank[i], &self->eta[i * r]);
         }
         i++;
     }

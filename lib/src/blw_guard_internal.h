@@ -13,7 +13,7 @@
  *  left. */
 #define GUARD_PIVOT_MIN BLW_R(1e-4)
 
-/** |e_i| / k above which rounding in l would show. */
+/** |h_i| / k above which rounding in l would show. */
 #define GUARD_GROSS BLW_R(64.0)
 
 /** Largest |step| that ends the descent, relative to k: eps^(2/3), about. */
@@ -43,19 +43,12 @@ typedef struct blw_guard_view {
     blw_real_t l;       /* largest |l_i| */
 } blw_guard_view_t;
 
-/** A sensor among some that move together. */
-typedef struct blw_guard_local {
-    size_t      sensor;
-    blw_real_t  k;        /* of (2), 0 if it is excluded */
-    blw_real_t *l;        /* [r] */
-    blw_real_t *tau;      /* [r] */
-    bool        attacked; /* nu_i /= 0 */
-} blw_guard_local_t;
-
+/** Sensors that move together; their copies of l and tau are in self->L and self->step. */
 typedef struct blw_guard_some {
-    size_t            count;
-    size_t            penalised; /* the first ones; the others are excluded */
-    blw_guard_local_t at[GUARD_SOME];
+    uint8_t count;
+    uint8_t penalised; /* the first ones; the others are excluded */
+    uint8_t sensor[GUARD_SOME];
+    bool    attacked[GUARD_SOME]; /* nu_i /= 0 */
 } blw_guard_some_t;
 
 /** l = S tau, every row. */

@@ -15,60 +15,81 @@
 /* Sweeps over some sensors at most before all are looked at again. */
 #define MOST_SWEEPS 8U
 
+/* The copies of the j-th sensor, [r]. */
+static inline blw_real_t *l_of(const blw_guard_t *self, size_t j)
+{
+    return &self->L[j * self->model->r];
+}
+
+static inline blw_real_t *tau_of(const blw_guard_t *self, size_t j)
+{
+    return &self->step[j * self->model->r];
+}
+
+/* k_i of the j-th sensor. */
+static inline blw_real_t k_of(const blw_guard_t *self, const blw_guard_some_t *some, size_t j)
+{
+    return (j < some->penalised) ? self->model->k : BLW_R(0.0);
+}
+
 /* Add step [r] to the sensor's own tau and l, and what it does to the l of the others. */
-static BLW_COLD void spread(const blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own,
+static BLW_COLD void spread(const blw_guard_t *self, const blw_guard_some_t *some, size_t own,
                             const blw_real_t *step)
 {
     const size_t r = self->model->r;
 
-    for (size_t a = 0U; a < r; a++) {
-        own->tau[a] += step[a];
-        own->l[a] += step[a];
-    }
+    blw_la_axpy(r, BLW_R(1.0), step, tau_of(self, own));
+    blw_la_axpy(r, BLW_R(1.0), step, l_of(self, own));
     for (size_t j = 0U; j < some->count; j++) {
-        blw_guard_local_t *const other = &some->at[j];
-
-        if (other != own) {
-            blw_guard_couple(self->model, other->sensor, own->sensor, step, other->l);
+        if (j != own) {
+            blw_guard_couple(self->model, some->sensor[j], some->sensor[own], step, l_of(self, j));
         }
     }
 }
 
 /* (7).  @return |step| */
-static BLW_COLD blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, blw_guard_local_t *own)
+static BLW_COLD blw_real_t update(blw_guard_t *self, blw_guard_some_t *some, size_t j)
 {
-    const size_t      r      = self->model->r;
-    blw_real_t *const step   = self->turned;
-    blw_real_t        square = BLW_R(0.0);
-    const blw_real_t  h =
-        blw_guard_step_alone(r, own->k, own->l, &self->e[own->sensor * r], own->tau, step, &square);
+    const size_t            r      = self->model->r;
+    const blw_real_t        k      = k_of(self, some, j);
+    const blw_real_t *const e      = &self->e[some->sensor[j] * r];
+    blw_real_t *const       step   = self->turned;
+    blw_real_t              square = BLW_R(0.0);
+    const blw_real_t        h =
+        blw_guard_step_alone(r, k, l_of(self, j), e, tau_of(self, j), step, &square);
 
-    spread(self, some, own, step);
-    own->attacked = h > own->k;
+    spread(self, some, j, step);
+    some->attacked[j] = h > k;
     return blw_la_sqrt(square);
 }
 
-/* (11) for the last two sensors. */
-static BLW_COLD void eliminate_two(blw_guard_t *self, blw_guard_some_t *some)
+/* The step that makes l of the last sensor 0. */
+static BLW_COLD void clear_last(blw_guard_t *self, const blw_guard_some_t *some)
 {
-    const size_t             r     = self->model->r;
-    blw_guard_local_t *const first = &some->at[some->count - 2U];
-    blw_guard_local_t *const last  = &some->at[some->count - 1U];
-    blw_real_t *const        step  = self->turned;
+    const size_t            last = some->count - 1U;
+    const blw_real_t *const l    = l_of(self, last);
 
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = -last->l[a];
+    for (size_t a = 0U; a < self->model->r; a++) {
+        self->turned[a] = -l[a];
     }
-    spread(self, some, last, step);
-    blw_guard_divide(self->model, first->sensor, last->sensor, first->l, &step[r], step);
+    spread(self, some, last, self->turned);
+}
+
+/* (11) for the last two sensors. */
+static BLW_COLD void eliminate_two(blw_guard_t *self, const blw_guard_some_t *some)
+{
+    const size_t      r     = self->model->r;
+    const size_t      first = some->count - 2U;
+    blw_real_t *const step  = self->turned;
+
+    clear_last(self, some);
+    blw_guard_divide(self->model, some->sensor[first], some->sensor[first + 1U], l_of(self, first),
+                     &step[r], step);
     for (size_t a = 0U; a < r; a++) {
         step[a] = -step[a];
     }
     spread(self, some, first, step);
-    for (size_t a = 0U; a < r; a++) {
-        step[a] = -last->l[a];
-    }
-    spread(self, some, last, step);
+    clear_last(self, some);
 }
 
 /* l_i = 0 for the excluded sensors; more than two, or two without pairs, get there step by step.
@@ -81,14 +102,14 @@ static BLW_COLD blw_real_t eliminate(blw_guard_t *self, blw_guard_some_t *some)
         if ((some->count - some->penalised) == 2U) {
             eliminate_two(self, some);
         } else if (some->count > some->penalised) {
-            (void)update(self, some, &some->at[some->penalised]);
+            (void)update(self, some, some->penalised);
         } else {
             /* nothing is excluded */
         }
         return largest;
     }
     for (size_t j = some->penalised; j < some->count; j++) {
-        largest = blw_la_max(largest, update(self, some, &some->at[j]));
+        largest = blw_la_max(largest, update(self, some, j));
     }
     return largest;
 }
@@ -99,7 +120,7 @@ static BLW_COLD blw_real_t sweep(blw_guard_t *self, blw_guard_some_t *some)
     blw_real_t largest = BLW_R(0.0);
 
     for (size_t j = 0U; j < some->penalised; j++) {
-        largest = blw_la_max(largest, update(self, some, &some->at[j]));
+        largest = blw_la_max(largest, update(self, some, j));
     }
     return blw_la_max(largest, eliminate(self, some));
 }
@@ -111,13 +132,13 @@ static BLW_COLD void settle(blw_guard_t *self, const blw_guard_some_t *some)
     blw_real_t *const step = self->turned;
 
     for (size_t j = 0U; j < some->count; j++) {
-        const blw_guard_local_t *const own = &some->at[j];
-        const size_t                   row = own->sensor * r;
+        const size_t            i   = some->sensor[j];
+        const blw_real_t *const tau = tau_of(self, j);
 
         for (size_t a = 0U; a < r; a++) {
-            step[a] = own->tau[a] - self->eta[row + a];
+            step[a] = tau[a] - self->eta[(i * r) + a];
         }
-        blw_guard_move_to(self, own->sensor, step, own->attacked);
+        blw_guard_move_to(self, i, step, some->attacked[j]);
     }
 }
 
@@ -129,21 +150,17 @@ static BLW_COLD unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_re
     unsigned     done = 0U;
 
     if (some->count == 1U) {
-        blw_guard_move_alone(self, some->at[0].sensor, some->at[0].k);
+        blw_guard_move_alone(self, some->sensor[0], k_of(self, some, 0U));
         return 1U;
     }
     if ((self->model->pairs != 0U) && (some->count == 2U) && (some->penalised == 1U)) {
-        blw_guard_move_alone(self, some->at[1].sensor, BLW_R(0.0));
-        blw_guard_move_beside(self, some->at[0].sensor, some->at[1].sensor);
+        blw_guard_move_alone(self, some->sensor[1], BLW_R(0.0));
+        blw_guard_move_beside(self, some->sensor[0], some->sensor[1]);
         return 1U;
     }
     for (size_t j = 0U; j < some->count; j++) {
-        blw_guard_local_t *const own = &some->at[j];
-
-        own->l   = &self->L[j * r];
-        own->tau = &self->step[j * r];
-        blw_la_copy(r, &self->l[own->sensor * r], own->l);
-        blw_la_copy(r, &self->eta[own->sensor * r], own->tau);
+        blw_la_copy(r, &self->l[some->sensor[j] * r], l_of(self, j));
+        blw_la_copy(r, &self->eta[some->sensor[j] * r], tau_of(self, j));
     }
     blw_real_t largest = eliminate(self, some);
     while ((done < sweeps) && ((done == 0U) || (largest > tolerance))) {
@@ -155,20 +172,18 @@ static BLW_COLD unsigned relax(blw_guard_t *self, blw_guard_some_t *some, blw_re
 }
 
 /* Put the sensors of a set at the end of the list.  @return false if they are too many. */
-static BLW_COLD bool append(const blw_guard_t *self, blw_mask_t set, blw_real_t k,
-                            blw_guard_some_t *some)
+static BLW_COLD bool append(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some)
 {
     const size_t most = (self->model->most < GUARD_SOME) ? self->model->most : GUARD_SOME;
-    size_t       i    = 0U;
+    uint8_t      i    = 0U;
 
     for (blw_mask_t rest = set; rest != 0U; rest >>= 1) {
         if ((rest & 1U) != 0U) {
             if (some->count >= most) {
                 return false;
             }
-            some->at[some->count].sensor   = i;
-            some->at[some->count].k        = k;
-            some->at[some->count].attacked = true;
+            some->sensor[some->count]   = i;
+            some->attacked[some->count] = true;
             some->count++;
         }
         i++;
@@ -179,12 +194,11 @@ static BLW_COLD bool append(const blw_guard_t *self, blw_mask_t set, blw_real_t 
 BLW_COLD bool blw_guard_list(const blw_guard_t *self, blw_mask_t set, blw_guard_some_t *some)
 {
     const blw_mask_t excluded = self->excluded;
-    bool             room     = true;
 
     some->count     = 0U;
-    room            = append(self, set & ~excluded, self->model->k, some);
+    bool room       = append(self, set & ~excluded, some);
     some->penalised = some->count;
-    room            = room && append(self, set & excluded, BLW_R(0.0), some);
+    room            = room && append(self, set & excluded, some);
     some->count     = room ? some->count : 0U;
     return room;
 }

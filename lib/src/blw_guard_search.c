@@ -21,7 +21,7 @@ static BLW_COLD void gather_row(const blw_guard_t *self, blw_mask_t set, size_t 
             to += model->r;
         }
     }
-    blw_la_fill(a, BLW_R(0.0), to);
+    blw_la_zero(a, to);
     to[a] = (a < model->rank[i]) ? BLW_R(1.0) : BLW_R(0.0);
 }
 
@@ -287,7 +287,7 @@ static BLW_COLD blw_real_t explained_by(const blw_guard_t *self, blw_mask_t set)
     blw_guard_some_t some;
 
     if ((self->model->pairs != 0U) && blw_guard_list(self, set, &some) && (some.count == 2U)) {
-        return explained_by_two(self, some.at[0].sensor, some.at[1].sensor);
+        return explained_by_two(self, some.sensor[0], some.sensor[1]);
     }
     const size_t rows = blw_guard_gather(self, set);
 

@@ -66,47 +66,50 @@ static BLW_COLD void list_next(blw_guard_t *self, const descent_t *descent, blw_
     }
 }
 
-/* Move those; fewer still if they do not move.  @return whether anything moved. */
-static BLW_COLD BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent,
-                                         blw_real_t close)
+/* Move those, fewer still if they do not move, and count the look at all sensors.
+ * @return whether anything moved. */
+static BLW_COLD BLW_APART bool move_next(blw_guard_t *self, const descent_t *descent)
 {
     const unsigned   limit = descent->limit - LOOK;
+    blw_real_t       close = GUARD_TOLERANCE * self->model->k;
     blw_guard_some_t some;
 
-    list_next(self, descent, &some);
-    if (blw_guard_move_some(self, &some, close, limit)) {
-        return true;
-    }
-    (void)blw_guard_list(self, self->excluded | guard_bit(descent->view.sensor), &some);
-    return blw_guard_move_some(self, &some, close, limit);
-}
-
-/* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
-static BLW_COLD BLW_APART bool update(blw_guard_t *self, descent_t *descent)
-{
-    const blw_real_t k       = self->model->k;
-    const blw_mask_t next    = guard_bit(descent->view.sensor);
-    const blw_mask_t support = self->attacked | self->excluded;
-    const bool       several = !blw_guard_exact(self, blw_mask_count(self->excluded));
-    blw_real_t       close   = GUARD_TOLERANCE * k;
-
-    if ((self->updates + LOOK + ((self->excluded != 0U) ? 4U : 1U)) > descent->limit) {
-        return false;
-    }
-    if ((self->attacked & next) != 0U) {
-        descent->repeats++;
-    }
-    if (((((self->excluded & next) != 0U) && several) || (descent->repeats > PATIENCE))
-        && (update_jointly(self, support, descent->limit)
-            || (several && update_jointly(self, self->excluded, descent->limit)))) {
-        return true;
-    }
     if (descent->decides) {
         close = blw_la_max(close, COARSE * descent->view.largest);
     }
-    const bool moved = move_next(self, descent, close);
-    self->updates    = (uint16_t)(self->updates + LOOK);
+    list_next(self, descent, &some);
+    bool moved = blw_guard_move_some(self, &some, close, limit);
+    if (!moved) {
+        (void)blw_guard_list(self, self->excluded | guard_bit(descent->view.sensor), &some);
+        moved = blw_guard_move_some(self, &some, close, limit);
+    }
+    self->updates = (uint16_t)(self->updates + LOOK);
     return moved;
+}
+
+/* Newton steps on sensors that would come up again and again.  @return whether anything was
+ * done. */
+static BLW_COLD BLW_APART bool move_support(blw_guard_t *self, descent_t *descent)
+{
+    const blw_mask_t next    = guard_bit(descent->view.sensor);
+    const blw_mask_t support = self->attacked | self->excluded;
+    const bool       several = !blw_guard_exact(self, blw_mask_count(self->excluded));
+
+    if ((self->attacked & next) != 0U) {
+        descent->repeats++;
+    }
+    return ((((self->excluded & next) != 0U) && several) || (descent->repeats > PATIENCE))
+           && (update_jointly(self, support, descent->limit)
+               || (several && update_jointly(self, self->excluded, descent->limit)));
+}
+
+/* Reduce the largest step.  @return false if what is left of the limit is too little for that. */
+static BLW_COLD bool update(blw_guard_t *self, descent_t *descent)
+{
+    if ((self->updates + LOOK + ((self->excluded != 0U) ? 4U : 1U)) > descent->limit) {
+        return false;
+    }
+    return move_support(self, descent) || move_next(self, descent);
 }
 
 /* Descend until nothing moves, the choice is clear, or the limit is reached.  @return whether
@@ -255,12 +258,6 @@ static BLW_COLD BLW_APART blw_mask_t find_excluded(blw_guard_t *self, unsigned l
     blw_mask_t     set   = 0U;
     bool           clear = false;
 
-    if (descent->decides) {
-        exclude_at_once(self, 2U * limit, descent);
-    }
-    if (self->excluded != 0U) {
-        return self->excluded;
-    }
     *converged = descend(self, descent->decides ? limit : most, descent);
     if (descent->decides) {
         set = descent->chosen;
@@ -278,11 +275,17 @@ static BLW_COLD blw_real_t solve(blw_guard_t *self, bool *converged)
     const blw_guard_model_t *const model   = self->model;
     const unsigned                 most    = model->max_updates;
     const bool                     search  = model->search != 0U;
+    const unsigned                 limit   = search ? (most / 4U) : (most / 2U);
     descent_t                      descent = {.decides = self->warm_up == 0U};
 
     descent.gross = blw_guard_begin(self);
-    const blw_mask_t set =
-        find_excluded(self, search ? (most / 4U) : (most / 2U), &descent, converged);
+    if (descent.decides) {
+        exclude_at_once(self, 2U * limit, &descent);
+    }
+    blw_mask_t set = self->excluded;
+    if (set == 0U) {
+        set = find_excluded(self, limit, &descent, converged);
+    }
     if (set != 0U) {
         *converged = descend_without(self, set, search ? (most / 2U) : most, &descent);
     }

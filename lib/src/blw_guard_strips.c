@@ -2,9 +2,16 @@
 /* The width of a strip is a constant wherever the inner functions are used, so that the compiler
  * keeps the sums in registers; that is why they are inline. */
 #include "blw_guard_strips.h"
+#include "blw_cold.h"
 
 /* Rows of two strips. */
 #define GUARD_TWO 6U
+
+/* Rows of a strip if so many are left. */
+static inline size_t width_of(size_t rows)
+{
+    return (rows < GUARD_STRIP) ? rows : GUARD_STRIP;
+}
 
 static inline void mul_strip(size_t width, size_t count, const blw_real_t *M, const blw_real_t *x,
                              blw_real_t *y)
@@ -141,19 +148,20 @@ void blw_guard_mul(size_t rows, size_t cols, size_t first, size_t count, const b
     const size_t skip = first * GUARD_STRIP;
     size_t       a    = 0U;
 
-    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
+    for (; (BLW_AT_ONCE != 0) && ((a + GUARD_TWO) <= rows); a += GUARD_TWO) {
         mul_two(count, &M[(a * cols) + skip], &M[((a + 3U) * cols) + skip], x, &y[a]);
     }
-    if ((a + 3U) <= rows) {
-        mul_strip(3U, count, &M[(a * cols) + skip], x, &y[a]);
-        a += 3U;
-    }
-    if ((rows - a) == 2U) {
-        mul_strip(2U, count, &M[(a * cols) + (first * 2U)], x, &y[a]);
-    } else if ((rows - a) == 1U) {
-        mul_strip(1U, count, &M[(a * cols) + first], x, &y[a]);
-    } else {
-        /* all rows are done */
+    for (; a < rows; a += GUARD_STRIP) {
+        const size_t            width = width_of(rows - a);
+        const blw_real_t *const strip = &M[(a * cols) + (first * width)];
+
+        if (width == 3U) {
+            mul_strip(3U, count, strip, x, &y[a]);
+        } else if (width == 2U) {
+            mul_strip(2U, count, strip, x, &y[a]);
+        } else {
+            mul_strip(1U, count, strip, x, &y[a]);
+        }
     }
 }
 
@@ -164,21 +172,22 @@ void blw_guard_mul_t(size_t rows, size_t cols, size_t first, size_t count, const
     const blw_real_t *start = from;
     size_t            a     = 0U;
 
-    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
+    for (; (BLW_AT_ONCE != 0) && ((a + GUARD_TWO) <= rows); a += GUARD_TWO) {
         mul_t_two(count, &M[(a * cols) + skip], &M[((a + 3U) * cols) + skip], &x[a], start, to);
         start = to;
     }
-    if ((a + 3U) <= rows) {
-        mul_t_strip(3U, count, &M[(a * cols) + skip], &x[a], start, to);
+    for (; a < rows; a += GUARD_STRIP) {
+        const size_t            width = width_of(rows - a);
+        const blw_real_t *const strip = &M[(a * cols) + (first * width)];
+
+        if (width == 3U) {
+            mul_t_strip(3U, count, strip, &x[a], start, to);
+        } else if (width == 2U) {
+            mul_t_strip(2U, count, strip, &x[a], start, to);
+        } else {
+            mul_t_strip(1U, count, strip, &x[a], start, to);
+        }
         start = to;
-        a += 3U;
-    }
-    if ((rows - a) == 2U) {
-        mul_t_strip(2U, count, &M[(a * cols) + (first * 2U)], &x[a], start, to);
-    } else if ((rows - a) == 1U) {
-        mul_t_strip(1U, count, &M[(a * cols) + first], &x[a], start, to);
-    } else {
-        /* all rows are done */
     }
 }
 
@@ -187,18 +196,19 @@ void blw_guard_both(size_t rows, size_t cols, const blw_real_t *M, const blw_rea
 {
     size_t a = 0U;
 
-    for (; (a + GUARD_TWO) <= rows; a += GUARD_TWO) {
+    for (; (BLW_AT_ONCE != 0) && ((a + GUARD_TWO) <= rows); a += GUARD_TWO) {
         both_two(cols, &M[a * cols], &M[(a + 3U) * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
     }
-    if ((a + 3U) <= rows) {
-        both_strip(3U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
-        a += 3U;
-    }
-    if ((rows - a) == 2U) {
-        both_strip(2U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
-    } else if ((rows - a) == 1U) {
-        both_strip(1U, cols, &M[a * cols], &x_rows[a], x_cols, &y_rows[a], y_cols);
-    } else {
-        /* all rows are done */
+    for (; a < rows; a += GUARD_STRIP) {
+        const size_t            width = width_of(rows - a);
+        const blw_real_t *const strip = &M[a * cols];
+
+        if (width == 3U) {
+            both_strip(3U, cols, strip, &x_rows[a], x_cols, &y_rows[a], y_cols);
+        } else if (width == 2U) {
+            both_strip(2U, cols, strip, &x_rows[a], x_cols, &y_rows[a], y_cols);
+        } else {
+            both_strip(1U, cols, strip, &x_rows[a], x_cols, &y_rows[a], y_cols);
+        }
     }
 }

@@ -29,7 +29,8 @@ def layouts(real: type) -> dict[str, type]:
                     + [(k, ct.POINTER(word)) for k in ("unit", "rank")]
                     + [(k, pointer) for k in ("Lam", "b", "S", "V", "s", "Fu", "Gu", "Xu",
                                               "Xs", "Sig", "effect", "drift")]
-                    + [(k, real) for k in ("k", "exclude", "gain", "kappa", "omega", "sigma")]
+                    + [(k, real) for k in ("k", "exclude", "gross", "gain", "kappa", "omega",
+                                           "sigma")]
                     + [(k, ct.c_void_p) for k in ("solver", "advance", "multiply", "squares",
                                                  "average", "fuse", "move")])
 

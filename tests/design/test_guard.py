@@ -412,3 +412,12 @@ def test_ratio_given_one_attacker_is_below_one_for_every_sensor():
         fusion = guard_fusion.fuse(
             guard_filters.filters(plant, np.linalg.eigvals(gains.Acl)))
         assert guard_fusion.ratios(fusion, plant.units, 1).max() <= 1.0 + 1e-9
+
+
+def test_design_given_a_mode_that_one_sensor_alone_sees_tells_no_ratio_of_it():
+    plant, gains = golden.build("alone", {
+        "A": np.diag([0.7, 0.85, 0.999]), "Bu": np.zeros((3, 1)), "Q": 0.1 * np.eye(3),
+        "C": [[0.2, 0.4, -0.7], [1.0, 0.0, 0.0], [0.0, 0.3, 0.0]], "R": np.eye(3)})
+    figures = guard.design(plant, gains, guard.Options()).info
+    assert figures["ratio"] == [None, 0.0, 0.0]
+    assert figures["unchecked_sensors"] == ["y1"]

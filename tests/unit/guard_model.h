@@ -59,6 +59,7 @@ static inline void guard_seal(guard_made_t *made)
     blw_table_add(&check, model->drift, 3U);
     blw_table_add_real(&check, model->k);
     blw_table_add_real(&check, model->exclude);
+    blw_table_add_real(&check, model->gross);
     blw_table_add_real(&check, model->gain);
     blw_table_add_real(&check, model->kappa);
     blw_table_add_real(&check, model->omega);
@@ -94,6 +95,7 @@ static inline void guard_make(guard_made_t *made)
         .drift       = guard_ones,
         .k           = BLW_R(2.0),
         .exclude     = BLW_R(3.0),
+        .gross       = BLW_R(128.0),
         .gain        = BLW_R(0.125),
         .kappa       = BLW_R(1.0),
         .omega       = BLW_R(1.0),

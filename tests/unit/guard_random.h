@@ -86,7 +86,32 @@ static inline blw_real_t *random_strips(const double *M, size_t stride, size_t r
     return to;
 }
 
-/** Eigenvalues of T [r x r] on its diagonal, eigenvectors in the rows of V: cyclic Jacobi. */
+/** One rotation of random_eigen(): rows p and q of T and V, then columns p and q of T. */
+static inline void random_rotate(size_t r, size_t p, size_t q, double T[RANDOM_R][RANDOM_R],
+                                 double V[RANDOM_R][RANDOM_R])
+{
+    const double theta = (T[q][q] - T[p][p]) / (2.0 * T[p][q]);
+    const double t     = copysign(1.0, theta) / (fabs(theta) + sqrt((theta * theta) + 1.0));
+    const double c     = 1.0 / sqrt((t * t) + 1.0);
+    const double s     = t * c;
+
+    for (size_t j = 0U; j < r; j++) {
+        const double Tp = T[p][j];
+        const double Vp = V[p][j];
+        T[p][j]         = (c * Tp) - (s * T[q][j]);
+        T[q][j]         = (s * Tp) + (c * T[q][j]);
+        V[p][j]         = (c * Vp) - (s * V[q][j]);
+        V[q][j]         = (s * Vp) + (c * V[q][j]);
+    }
+    for (size_t j = 0U; j < r; j++) {
+        const double Tp = T[j][p];
+        T[j][p]         = (c * Tp) - (s * T[j][q]);
+        T[j][q]         = (s * Tp) + (c * T[j][q]);
+    }
+}
+
+/** Eigenvalues of T [r x r] on its diagonal, eigenvectors in the rows of V: cyclic Jacobi.  It
+ *  converges quadratically; what is left of T[p][q] below 1e-12 changes no table. */
 static inline void random_eigen(size_t r, double T[RANDOM_R][RANDOM_R],
                                 double V[RANDOM_R][RANDOM_R])
 {
@@ -95,25 +120,15 @@ static inline void random_eigen(size_t r, double T[RANDOM_R][RANDOM_R],
             V[a][c] = (a == c) ? 1.0 : 0.0;
         }
     }
-    for (size_t turn = 0U; turn < (12U * r * r); turn++) {
-        const size_t p     = turn % r;
-        const size_t q     = (p + 1U + ((turn / r) % ((r > 1U) ? (r - 1U) : 1U))) % r;
-        const double theta = (p == q) ? 0.0 : (0.5 * atan2(2.0 * T[p][q], T[q][q] - T[p][p]));
-        const double c     = cos(theta);
-        const double s     = sin(theta);
-
-        for (size_t j = 0U; j < r; j++) { /* rows, then columns */
-            const double Tp = T[p][j];
-            const double Vp = V[p][j];
-            T[p][j]         = (p == q) ? Tp : ((c * Tp) - (s * T[q][j]));
-            T[q][j]         = (p == q) ? Tp : ((s * Tp) + (c * T[q][j]));
-            V[p][j]         = (p == q) ? Vp : ((c * Vp) - (s * V[q][j]));
-            V[q][j]         = (p == q) ? Vp : ((s * Vp) + (c * V[q][j]));
-        }
-        for (size_t j = 0U; j < r; j++) {
-            const double Tp = T[j][p];
-            T[j][p]         = (p == q) ? Tp : ((c * Tp) - (s * T[j][q]));
-            T[j][q]         = (p == q) ? Tp : ((s * Tp) + (c * T[j][q]));
+    for (bool rotated = true; rotated;) {
+        rotated = false;
+        for (size_t pair = 0U; pair < (r * r); pair++) {
+            const size_t p = pair / r;
+            const size_t q = pair % r;
+            if ((p < q) && (fabs(T[p][q]) > 1e-12)) {
+                random_rotate(r, p, q, T, V);
+                rotated = true;
+            }
         }
     }
 }
@@ -196,6 +211,7 @@ static inline void random_seal(guard_random_t *made)
     blw_table_add(&check, model->drift, m);
     blw_table_add_real(&check, model->k);
     blw_table_add_real(&check, model->exclude);
+    blw_table_add_real(&check, model->gross);
     blw_table_add_real(&check, model->gain);
     blw_table_add_real(&check, model->kappa);
     blw_table_add_real(&check, model->omega);
@@ -227,6 +243,7 @@ static inline void random_bind(guard_random_t *made, size_t r, size_t p)
         .drift   = made->ones,
         .k       = BLW_R(2.0),
         .exclude = BLW_R(3.0),
+        .gross   = BLW_R(128.0),
         .gain    = BLW_R(0.125),
         .kappa   = BLW_R(1.0),
         .omega   = BLW_R(1.0),

@@ -110,12 +110,13 @@ static void test_init_given_wrong_numbers_refuses(void)
 {
     static const blw_real_t zeros[3] = {BLW_R(0.0), BLW_R(0.0), BLW_R(0.0)};
     static const blw_real_t minus[3] = {BLW_R(-1.0), BLW_R(1.0), BLW_R(1.0)};
-    blw_real_t *const       value[6] = {&made.model.k,     &made.model.exclude, &made.model.gain,
-                                        &made.model.kappa, &made.model.omega,   &made.model.sigma};
-    const blw_real_t        bad[6]   = {BLW_R(0.0),  BLW_R(1.0),  BLW_R(0.0),
+    blw_real_t *const       value[7] = {&made.model.k,    &made.model.exclude, &made.model.gross,
+                                        &made.model.gain, &made.model.kappa,   &made.model.omega,
+                                        &made.model.sigma};
+    const blw_real_t        bad[7]   = {BLW_R(0.0),  BLW_R(1.0),  BLW_R(0.0), BLW_R(0.0),
                                         BLW_R(-1.0), BLW_R(-1.0), BLW_R(-1.0)};
 
-    for (size_t i = 0U; i < 6U; i++) {
+    for (size_t i = 0U; i < 7U; i++) {
         *value[i] = bad[i];
         guard_seal(&made);
         assert_refused();

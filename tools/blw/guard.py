@@ -5,32 +5,38 @@ The derivation is in docs/guard.md; the local filters are made by guard_filters,
 guard_fusion, poles for fewer local states than n by guard_order.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import comb
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import guard_fusion, guard_order, guard_straight, margin
+from blw import gaps, guard_fusion, guard_order, guard_straight, margin
 from blw.design import Designed
 from blw.errors import DesignError, ModelError
 from blw.guard_filters import Filters, filters
 from blw.guard_fusion import Fusion
-from blw.kalman import Kalman
+from blw.kalman import Kalman, steady_state
 from blw.l1 import probability
 from blw.model import Model
+from blw.semidefinite import root
 from blw.tables import Link, Struct, Table, index, real, table
 
 Array = NDArray
 
 NAME = "guard"
-AVERAGES = True
+GAPS = "weighted"
 
 DEFAULT_RECOVERY = 0.99
 
 #: Exclusion threshold where none is given, relative to k.
 EXCLUDE = 1.5
+
+#: An attack is gross beyond so many k, where rounding in l shows, and so many times benign_size():
+#: where the others hardly check a direction, |e_i| is large without any attack.
+GROSS = 64.0
+BENIGN = 10.0
 
 #: Rows of a strip, BLW_GUARD_STRIP.
 STRIP = 3
@@ -82,11 +88,7 @@ class Options:
 def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     """Tables and figures of `guard` for one model.  Raises ModelError, DesignError."""
     check_options(options, model)
-    poles = np.linalg.eigvals(kalman.Acl)
-    bank = filters(model, guard_order.reduced(poles, options.order or model.n))
-    if bank.split.n_u < model.n and np.any(model.rate < 1.0):
-        raise DesignError("plant.rate needs modes that are all fused securely, but "
-                          f"{model.n - bank.split.n_u} of A decay faster; use decentral")
+    model, kalman, bank = _bank(model, kalman, options)
     try:
         fusion = guard_fusion.fuse(bank)
     except np.linalg.LinAlgError:
@@ -99,10 +101,30 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "max_updates": limits.max_updates,
         "warm_up_steps": limits.warm_up,
         **filter_figures(model, kalman, bank, fusion),
-        **guard_order.curve(model, poles, bank),
+        **guard_order.curve(model, np.linalg.eigvals(kalman.Acl), bank),
     }
     tables = struct(model, kalman, bank, fusion, limits)
     return Designed(tables, info, mem=(model.n, model.m, bank.r, newton_sensors(model)))
+
+
+def _bank(model: Model, kalman: Kalman, options: Options) -> tuple[Model, Kalman, Filters]:
+    """The local filters, and the model and filter that they are for.
+
+    What decays fast is not fused, and its coasting over a missing sample cannot be weighed by a
+    table: then every sample counts once (gaps.cautious()).
+    """
+    bank = _filters(model, kalman, options)
+    if bank.split.n_u == model.n or np.all(model.rate == 1.0):
+        return model, kalman, bank
+    plain = replace(model, R=model.sample_R)
+    model, kalman = gaps.cautious(plain, steady_state(plain.A, plain.C, plain.W, plain.R))
+    model = replace(model, rate=np.ones(model.m))
+    return model, kalman, _filters(model, kalman, options)
+
+
+def _filters(model: Model, kalman: Kalman, options: Options) -> Filters:
+    poles = np.linalg.eigvals(kalman.Acl)
+    return filters(model, guard_order.reduced(poles, options.order or model.n))
 
 
 @dataclass(frozen=True)
@@ -111,6 +133,7 @@ class Limits:
 
     k: float
     exclude: float
+    gross: float
     search: bool
     max_updates: int
     warm_up: int
@@ -134,6 +157,7 @@ def choose_limits(
     return Limits(
         k=k,
         exclude=exclude,
+        gross=max(GROSS * k, BENIGN * benign_size(kalman, bank, fusion).max()),
         search=search,
         max_updates=options.max_updates or default_updates(model, bank.r, pairs, search, recovery),
         warm_up=warm_up_steps(model, kalman, bank, fusion),
@@ -143,7 +167,7 @@ def choose_limits(
             "recovery_probability": recovery,
             "k_for_recovery": {str(p): float(np.quantile(samples, p)) for p in (0.9, 0.99, 0.999)},
             "k_if_independent": guard_fusion.chi2_threshold(fusion, wanted),
-            "ratio": ratios.tolist(),
+            "ratio": [ratio if np.isfinite(ratio) else None for ratio in ratios.tolist()],
         },
     )
 
@@ -172,6 +196,7 @@ def struct(
         "drift": table(drift_thresholds(model, bank, fusion), "[m] on |average of l_i|"),
         "k": real(limits.k),
         "exclude": real(limits.exclude),
+        "gross": real(limits.gross),
         "gain": real(DRIFT_GAIN),
         "kappa": real(guard_fusion.kappa(fusion, bank.split.Xu, sets)),
         "omega": real(np.sqrt(model.m) * norm(fusion.W @ fusion.Z)),
@@ -282,6 +307,15 @@ def estimate_of(bank: Filters, fusion: Fusion) -> Array:
     return bank.split.Xu @ fusion.Fu + bank.split.Xs @ fusion.Sig @ fusion.S
 
 
+def benign_size(kalman: Kalman, bank: Filters, fusion: Fusion) -> Array:
+    """[m] standard deviation of |e_i| without attack, over the rows that others can check: at most
+    that of the local error and that of the prediction in its coordinates together."""
+    Pu = bank.split.Tu @ kalman.Pp @ bank.split.Tu.T
+    parts = (fusion.W, fusion.Gu @ Pu @ fusion.Gu.T)
+    return np.array([sum(np.sqrt(np.diag(part)[fusion.rows(i)][:rank].sum()) for part in parts)
+                     for i, rank in enumerate(fusion.rank)])
+
+
 def effects(bank: Filters, fusion: Fusion) -> Array:
     """[m] |x_hat| per |tau_i|."""
     F = estimate_of(bank, fusion)
@@ -290,13 +324,10 @@ def effects(bank: Filters, fusion: Fusion) -> Array:
 
 def warm_up_steps(model: Model, kalman: Kalman, bank: Filters, fusion: Fusion) -> int:
     """Steps until an initial error of START_ERROR times P0 moves no |l_i| by more than 1."""
-    root = np.linalg.cholesky(kalman.P + 1e-14 * np.trace(kalman.P) * np.eye(model.n))
-    if model.P0 is not None:
-        values, vectors = np.linalg.eigh(model.P0)
-        root = vectors * np.sqrt(np.clip(values, 0.0, None))
+    start = root(kalman.P if model.P0 is None else model.P0)
     split, m, r = bank.split, bank.m, bank.r
-    eps = -(fusion.Gu @ split.Tu @ root)
-    xs = split.Ts @ root
+    eps = -(fusion.Gu @ split.Tu @ start)
+    xs = split.Ts @ start
     drive = model.C @ split.Xs @ split.As
     for steps in range(LONGEST_WARM_UP):
         l = (fusion.S @ eps).reshape(m, r, -1)

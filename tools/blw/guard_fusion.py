@@ -17,13 +17,13 @@ of entries of b_i', that need not be zero.
 
 from dataclasses import dataclass
 from itertools import combinations
-from math import comb
+from math import comb, sqrt
 
 import numpy as np
 import scipy.linalg
-import scipy.stats
 from numpy.typing import NDArray
 
+from blw import chi2
 from blw.guard_filters import Filters
 
 Array = NDArray
@@ -165,8 +165,7 @@ def largest_multiplier(fusion: Fusion) -> Array:
 
 def chi2_threshold(fusion: Fusion, probability: float) -> float:
     """k as if the m tests were independent: the closed form of SPEC 4.1."""
-    quantile = scipy.stats.chi2.ppf(probability ** (1.0 / fusion.m), max(fusion.rank))
-    return float(np.sqrt(quantile))
+    return sqrt(chi2.threshold(1.0 - probability ** (1.0 / fusion.m), max(fusion.rank)))
 
 
 def unit_sets(units: list[list[int]], p: int) -> list[tuple[int, ...]] | None:
@@ -221,7 +220,7 @@ def ratios(fusion: Fusion, units: list[list[int]], p: int, samples: int = 4000) 
         for j in range(len(units)):
             others = np.sort(np.delete(share, j, axis=0), axis=0)[::-1]
             taken = share[j] + others[: p - 1].sum(axis=0)
-            worst[j] = max(worst[j], float((taken / (share.sum(axis=0) - taken)).max()))
+            worst[j] = max(worst[j], float(_ratio(taken, share).max()))
         best = x[:, np.argsort(-_worst_ratio(share, p))[:50]]
         x = np.repeat(best, 40, axis=1)
         x = x + 0.1 * np.linalg.norm(x, axis=0) * generator.standard_normal(x.shape)
@@ -235,5 +234,10 @@ def _shares(fusion: Fusion, units: list[list[int]], x: Array) -> Array:
 
 
 def _worst_ratio(share: Array, p: int) -> Array:
-    taken = np.sort(share, axis=0)[::-1][:p].sum(axis=0)
-    return taken / np.maximum(share.sum(axis=0) - taken, np.finfo(float).tiny)
+    return _ratio(np.sort(share, axis=0)[::-1][:p].sum(axis=0), share)
+
+
+def _ratio(taken: Array, share: Array) -> Array:
+    """Of the share that was taken to the rest; infinite where nothing is left."""
+    rest = share.sum(axis=0) - taken
+    return np.divide(taken, rest, out=np.full(len(rest), np.inf), where=rest > 0.0)

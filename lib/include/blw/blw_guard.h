@@ -98,6 +98,7 @@ typedef struct blw_guard_model {
     const blw_real_t *drift;   /**< [m] largest benign |average of l_i|, > 0 */
     blw_real_t        k;       /**< threshold on |l_i|, > 0 */
     blw_real_t        exclude; /**< threshold on |h_i|, >= k */
+    blw_real_t        gross;   /**< limit on |e_i|, beyond which tau_i starts from 0, > 0 */
     blw_real_t        gain;    /**< of the exponentially weighted average of l_i, (0, 1] */
     blw_real_t        kappa;   /**< |Xu x| <= kappa sum_i |Gu_i x|, whatever p units are left
                                         out of the sum; 0 if there is no such number */
