@@ -6,6 +6,7 @@
 #include "plant.h"
 #include "session.h"
 #include "trial.h"
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -116,14 +117,16 @@ private:
         }
     }
 
-    /* Until the answer to step k, or until it is time for the next one. */
+    /* Until the answer to step k, or until it is time for the next one.  Steps that were missed are
+     * not made up for: in a burst they would overrun whoever listens. */
     void listen(std::uint64_t k)
     {
         blw_port_t *const   port     = link_->port();
         const bool          paced    = options_.pace_us > 0U;
         const std::uint64_t patience = 1000U * options_.patience_ms;
+        const std::uint64_t now_us   = blw_port_now_us(port);
         blw_frame_t         frame;
-        next_us_ = paced ? (next_us_ + options_.pace_us) : (blw_port_now_us(port) + patience);
+        next_us_ = paced ? std::max(next_us_ + options_.pace_us, now_us) : (now_us + patience);
         while ((blw_port_now_us(port) < next_us_) && !bus_interrupted) {
             if (!blw_port_recv(port, &frame)) {
                 wait_for({link_.get()}, WAIT_MS);

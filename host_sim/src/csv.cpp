@@ -29,6 +29,9 @@ std::string_view trimmed(std::string_view cell)
 
 CsvFile::CsvFile(const std::string &path) : path_(path), text_(read_file(path))
 {
+    if (text_.find('\0') != std::string::npos) {
+        throw InputError(path_ + ": is no text in ASCII or UTF-8: it has zero bytes");
+    }
     if (std::string_view(text_).substr(0U, BYTE_ORDER_MARK.size()) == BYTE_ORDER_MARK) {
         next_ = BYTE_ORDER_MARK.size();
     }

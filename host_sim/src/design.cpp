@@ -75,26 +75,6 @@ Eigen::MatrixXd read_gain(const Design &design)
     return table.reshaped<Eigen::RowMajor>(n, m);
 }
 
-/* P = Acl P Acl' + (I - K C) W (I - K C)' + K R K' by doubling: after i rounds the sum of the
- * first 2^i terms of the series. */
-Eigen::MatrixXd steady_covariance(const Design &design)
-{
-    const auto            n  = static_cast<Eigen::Index>(design.n);
-    const Eigen::MatrixXd IK = Eigen::MatrixXd::Identity(n, n) - design.K * design.C;
-    const Eigen::MatrixXd W  = design.B * design.Q * design.B.transpose();
-    Eigen::MatrixXd       F  = IK * design.A;
-    Eigen::MatrixXd       P  = IK * W * IK.transpose() + design.K * design.R * design.K.transpose();
-    const int             rounds = 40;
-    for (int i = 0; i < rounds; i++) {
-        P = (P + F * P * F.transpose()).eval();
-        F = (F * F).eval();
-    }
-    if (!P.allFinite()) {
-        design.method("kalman").fail("the gain K does not make the filter stable");
-    }
-    return 0.5 * (P + P.transpose());
-}
-
 } // namespace
 
 std::size_t Design::sensor_index(const std::string &sensor, const std::string &where) const
@@ -146,7 +126,7 @@ Design load_design(const std::string &path)
     design.y_min = top.member("plant").member("y_min").vector(design.m);
     design.y_max = top.member("plant").member("y_max").vector(design.m);
     design.K     = read_gain(design);
-    design.P     = steady_covariance(design);
+    design.P     = design.method("kalman").member("info").member("P").matrix(design.n, design.n);
     return design;
 }
 

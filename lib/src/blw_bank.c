@@ -69,7 +69,7 @@ BLW_COLD blw_status_t blw_bank_reset(blw_bank_t *self, const blw_real_t *x0)
     }
     blw_la_copy(plant->n, start, self->x_ref);
     blw_la_copy(plant->n, start, self->x_hat);
-    blw_la_fill((size_t)self->model->sets * plant->n, BLW_R(0.0), self->d);
+    blw_la_zero((size_t)self->model->sets * plant->n, self->d);
     for (size_t i = 0U; i < plant->m; i++) {
         self->age[i]    = 0U;
         self->silent[i] = 0U;
@@ -100,22 +100,22 @@ static void count_sample(blw_bank_t *self, size_t i, bool there)
 
 /* The sensors from which something can be expected: all that are not silent for good, or if every
  * sensor sends in every step those that have sent. */
-static blw_mask_t present(const blw_bank_t *self, blw_mask_t used)
+static unsigned present(const blw_bank_t *self, unsigned used)
 {
-    blw_mask_t found = 0U;
+    unsigned found = 0U;
 
     if (self->model->max_gap == 0U) {
         return used;
     }
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        found |= (self->silent[i] <= self->model->max_gap) ? ((blw_mask_t)1U << i) : 0U;
+        found |= (self->silent[i] <= self->model->max_gap) ? (1U << i) : 0U;
     }
     return found;
 }
 
 /* The reference to step k, and its innovations. */
 static void advance_reference(blw_bank_t *self, const blw_real_t *u, const blw_real_t *y,
-                              blw_mask_t used)
+                              unsigned used)
 {
     const blw_plant_t *const plant = self->model->head.plant;
     const size_t             n     = plant->n;
@@ -124,7 +124,7 @@ static void advance_reference(blw_bank_t *self, const blw_real_t *u, const blw_r
     blw_real_t *const e = &self->past_e[(size_t)self->newest * plant->m];
     blw_plant_predict(plant, self->x_ref, u, self->x_bar);
     for (size_t i = 0U; i < plant->m; i++) {
-        const bool there = ((used >> i) & 1U) != 0U;
+        const bool there = blw_bank_has(used, i);
 
         e[i] = there ? ((y[i] - plant->offset[i]) - blw_la_dot(n, &plant->C[i * n], self->x_bar))
                      : BLW_BANK_NO_SAMPLE;
@@ -147,7 +147,7 @@ static void count_gate(blw_bank_t *self, size_t set)
 /* (1) for one set, relative to x_bar of the reference.  A filter that a sample throws out of bounds
  * starts again from the reference.  first = sensors of all sets before this one.
  * @return the same for the next set */
-static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, blw_mask_t used)
+static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, unsigned used)
 {
     const blw_plant_t *const plant  = self->model->head.plant;
     const size_t             n      = plant->n;
@@ -168,7 +168,7 @@ static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, blw_mas
         if (!blw_bank_has(mask, i)) {
             continue;
         }
-        if (((used >> i) & 1U) != 0U) {
+        if (blw_bank_has(used, i)) {
             const blw_real_t r = e[i] - blw_la_dot(n, &plant->C[i * n], d_bar);
 
             blw_bank_add_column(n, size, &K[column], r, d);
@@ -178,14 +178,14 @@ static size_t advance_filter(blw_bank_t *self, size_t set, size_t first, blw_mas
     }
     count_gate(self, set);
     if (!blw_la_bounded(n, d)) {
-        blw_la_fill(n, BLW_R(0.0), d);
-        blw_la_fill(n, BLW_R(0.0), d_bar);
+        blw_la_zero(n, d);
+        blw_la_zero(n, d_bar);
     }
     blw_la_copy(n, (self->model->filtered != 0U) ? d : d_bar, &self->past_d[slot * n]);
     return first + size;
 }
 
-static void advance_filters(blw_bank_t *self, blw_mask_t used)
+static void advance_filters(blw_bank_t *self, unsigned used)
 {
     size_t first = 0U;
 
@@ -225,7 +225,7 @@ static void hold(blw_bank_t *self)
 
 /* The first passing set, that is the one with the least P_opt, of those that lack fewest samples.
  * @return false if none passes */
-static bool choose(blw_bank_t *self, blw_mask_t expected)
+static bool choose(blw_bank_t *self, unsigned expected)
 {
     unsigned fewest = BLW_BANK_MAX_SENSORS + 1U;
 
@@ -253,11 +253,9 @@ static void move_reference(blw_bank_t *self)
     blw_real_t *const move    = &self->past_move[(size_t)self->newest * n];
     blw_real_t *const d_first = self->d;
 
-    blw_la_copy(n, self->x_bar, self->x_hat);
-    blw_la_axpy(n, BLW_R(1.0), &self->past_d[slot * n], self->x_hat);
+    blw_la_sum(n, self->x_bar, &self->past_d[slot * n], self->x_hat);
     blw_la_copy(n, &d_first[(size_t)self->choice * n], move);
-    blw_la_copy(n, self->x_bar, self->x_ref);
-    blw_la_axpy(n, BLW_R(1.0), move, self->x_ref);
+    blw_la_sum(n, self->x_bar, move, self->x_ref);
     for (size_t s = 0U; s < sets; s++) {
         blw_la_axpy(n, BLW_R(-1.0), move, &d_first[s * n]);
     }
@@ -265,10 +263,10 @@ static void move_reference(blw_bank_t *self)
 
 /* A sensor is as suspicious as the best set that holds it.  @return the sensors that no passing set
  * holds, or if none passes those that the choice leaves out */
-static blw_mask_t suspect(blw_bank_t *self, blw_mask_t used, bool passed)
+static unsigned suspect(blw_bank_t *self, unsigned used, bool passed)
 {
-    const uint16_t chosen   = self->model->set_mask[self->choice];
-    blw_mask_t     excluded = 0U;
+    const unsigned chosen   = self->model->set_mask[self->choice];
+    unsigned       excluded = 0U;
 
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
         blw_real_t best = BLW_REAL_MAX;
@@ -278,16 +276,15 @@ static blw_mask_t suspect(blw_bank_t *self, blw_mask_t used, bool passed)
                 best = evidence(self, s);
             }
         }
-        const bool missing = ((used >> i) & 1U) == 0U;
-        self->suspicion[i] = missing ? BLW_R(1.0) : blw_step_suspicion(best);
+        self->suspicion[i] = blw_bank_has(used, i) ? blw_step_suspicion(best) : BLW_R(1.0);
         if (passed ? (best > BLW_R(1.0)) : !blw_bank_has(chosen, i)) {
-            excluded |= (blw_mask_t)1U << i;
+            excluded |= 1U << i;
         }
     }
     return excluded;
 }
 
-static uint8_t flags_of(const blw_bank_t *self, blw_mask_t used, blw_mask_t excluded)
+static uint8_t flags_of(const blw_bank_t *self, unsigned used, unsigned excluded)
 {
     unsigned flags = blw_step_flags(self->model->head.plant, used, excluded);
 
@@ -300,24 +297,24 @@ static uint8_t flags_of(const blw_bank_t *self, blw_mask_t used, blw_mask_t excl
     return (uint8_t)flags;
 }
 
-static void report(blw_bank_t *self, blw_mask_t used, bool passed, blw_estimator_out_t *out)
+static void report(blw_bank_t *self, unsigned used, bool passed, blw_estimator_out_t *out)
 {
-    const blw_mask_t excluded = suspect(self, used, passed);
-    blw_real_t       largest  = BLW_R(0.0);
+    const unsigned excluded = suspect(self, used, passed);
+    blw_real_t     largest  = BLW_R(0.0);
 
     for (size_t s = 0U; s < self->model->sets; s++) {
         largest = blw_la_max(largest, evidence(self, s));
     }
-    *out = (blw_estimator_out_t){
-        .x_hat     = self->x_hat,
-        .suspicion = self->suspicion,
-        .statistic = largest,
-        .threshold = BLW_R(1.0),
-        .excluded  = excluded,
-        .used      = used,
-        .outcome   = (uint8_t)(passed ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_HELD),
-        .flags     = flags_of(self, used, excluded),
-    };
+    out->x_hat      = self->x_hat;
+    out->suspicion  = self->suspicion;
+    out->statistic  = largest;
+    out->threshold  = BLW_R(1.0);
+    out->bound      = BLW_R(0.0);
+    out->excluded   = excluded;
+    out->used       = used;
+    out->iterations = 0U;
+    out->outcome    = (uint8_t)(passed ? BLW_OUTCOME_CONVERGED : BLW_OUTCOME_HELD);
+    out->flags      = flags_of(self, used, excluded);
 }
 
 blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real_t *y,
@@ -331,7 +328,7 @@ blw_status_t blw_bank_step(blw_bank_t *self, const blw_real_t *u, const blw_real
     if (status != BLW_OK) {
         return status;
     }
-    const blw_mask_t used = blw_plant_screen(plant, y, valid);
+    const unsigned used = (unsigned)blw_plant_screen(plant, y, valid); /* at most 8 sensors */
 
     advance_reference(self, u, y, used);
     advance_filters(self, used);

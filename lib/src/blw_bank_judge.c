@@ -11,10 +11,10 @@ BLW_COLD void blw_bank_judge_reset(blw_bank_t *self)
     if (model->window == 0U) {
         blw_la_copy(pairs, model->start, self->average);
     } else {
-        blw_la_fill(pairs * model->groups, BLW_R(0.0), self->average);
+        blw_la_zero(pairs * model->groups, self->average);
     }
-    blw_la_fill(model->sets, BLW_R(0.0), self->worst);
-    blw_la_fill(model->sets, BLW_R(0.0), self->gross);
+    blw_la_zero(model->sets, self->worst);
+    blw_la_zero(model->sets, self->gross);
     for (size_t s = 0U; s < model->sets; s++) {
         self->wait[s] = 0U;
     }
@@ -41,15 +41,14 @@ static void rebuild_block(blw_bank_t *self, size_t oldest)
     blw_real_t *const        z     = self->scratch;
     blw_real_t *const        moved = &self->scratch[n];
 
-    blw_la_fill(n, BLW_R(0.0), z);
+    blw_la_zero(n, z);
     for (size_t j = 0U; j < h; j++) {
         const size_t slot = (oldest + j) % h;
 
         blw_la_copy(m, &self->past_e[slot * m], &self->block[j * m]);
         blw_la_gemv_add(m, n, plant->C, z, &self->block[j * m]);
         blank(m, &self->past_e[slot * m], &self->block[j * m]);
-        blw_la_copy(n, z, moved);
-        blw_la_axpy(n, BLW_R(1.0), &self->past_move[slot * n], moved);
+        blw_la_sum(n, z, &self->past_move[slot * n], moved);
         blw_la_gemv(n, n, plant->A, moved, z);
     }
 }
@@ -79,7 +78,7 @@ static const blw_real_t *estimate_subset(blw_bank_t *self, size_t i, const blw_r
     blw_real_t *const x       = &self->x_fir[i * n];
     const blw_real_t *samples = self->block;
 
-    blw_la_fill(n, BLW_R(0.0), x);
+    blw_la_zero(n, x);
     for (size_t column = 0U; column < columns; column += size) {
         for (size_t s = 0U; s < size; s++) {
             blw_bank_add_column(n, columns, &Z[column + s], samples[list[s]], x);
@@ -95,7 +94,7 @@ static void multiply(const blw_plant_t *plant, blw_real_t *M, blw_real_t *row)
     const size_t n = plant->n;
 
     for (size_t r = 0U; r < n; r++) {
-        blw_la_fill(n, BLW_R(0.0), row);
+        blw_la_zero(n, row);
         for (size_t j = 0U; j < n; j++) {
             blw_la_axpy(n, M[(r * n) + j], &plant->A[j * n], row);
         }
@@ -115,7 +114,7 @@ static void respond(blw_bank_t *self, size_t subset, const blw_real_t *Z, size_t
     blw_real_t *const        M       = &self->response[subset * n * n];
     size_t                   column  = columns;
 
-    blw_la_fill(n * n, BLW_R(0.0), M);
+    blw_la_zero(n * n, M);
     for (size_t j = h; j > 0U; j--) {
         const blw_real_t *const e = &self->past_e[((oldest + (j - 1U)) % h) * m];
 
@@ -233,7 +232,7 @@ void blw_bank_judge(blw_bank_t *self)
     self->blocks++;
     if (self->blocks == model->window) {
         decide(self);
-        blw_la_fill(pairs * model->groups, BLW_R(0.0), self->average);
+        blw_la_zero(pairs * model->groups, self->average);
         self->blocks = 0U;
     }
 }

@@ -8,6 +8,9 @@
  *  BLW_APART keeps a function out of its caller, whose frame lies on the stack while deeper
  *  functions run: what one part of a step needs for itself is then not there during the others.
  *
+ *  BLW_AT_ONCE is 0 in a build for size, where loops that take several elements or rows at once to
+ *  save work do without them.  The order of every sum is the same, and so are its bits.
+ *
  *  What they mark computes the same, so a compiler that does not know them loses nothing else.
  */
 #ifndef BLW_COLD_H
@@ -19,6 +22,12 @@
 #else
 #define BLW_COLD
 #define BLW_APART
+#endif
+
+#ifdef __OPTIMIZE_SIZE__
+#define BLW_AT_ONCE 0
+#else
+#define BLW_AT_ONCE 1
 #endif
 
 #endif

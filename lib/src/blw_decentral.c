@@ -11,6 +11,9 @@
 /* Steps in a row without suspicion after which excluded sensors seem to tell the truth. */
 #define CALM_STEPS 4U
 
+/* Times the threshold: what the plant does that its model does not know stays below. */
+#define FAR_OFF BLW_R(4.0)
+
 static BLW_COLD size_t mem_len_of(const blw_decentral_model_t *model)
 {
     const blw_plant_t *const plant = model->head.plant;
@@ -36,9 +39,9 @@ static void bind(blw_decentral_t *self, blw_real_t *mem)
     self->delta     = blw_la_take(&mem, mu);
     self->z         = blw_la_take(&mem, mu);
     self->w         = blw_la_take(&mem, steady ? (mu - n) : (mu + n + m));
-    self->t         = steady ? blw_la_take(&mem, model->rows) : NULL;
+    self->t         = steady ? mem : NULL;
     self->L         = steady ? NULL : blw_la_take(&mem, blw_la_packed_row(mu));
-    self->X         = steady ? NULL : blw_la_take(&mem, mu * (mu + n + m));
+    self->X         = steady ? NULL : mem;
 }
 
 BLW_COLD blw_status_t blw_decentral_init(blw_decentral_t *self, const blw_decentral_model_t *model,
@@ -71,8 +74,8 @@ BLW_COLD blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_
         return BLW_ERR_ARG;
     }
     blw_la_copy(plant->n, start, self->x_hat);
-    blw_la_fill(self->model->mu, BLW_R(0.0), self->delta);
-    blw_la_fill(plant->m, BLW_R(0.0), self->gap);
+    blw_la_zero(self->model->mu, self->delta);
+    blw_la_zero(plant->m, self->gap);
     self->k      = 0U;
     self->set    = 0U;
     self->passes = 0U;
@@ -84,39 +87,40 @@ BLW_COLD blw_status_t blw_decentral_reset(blw_decentral_t *self, const blw_real_
     return BLW_OK;
 }
 
-/* nu_i, suspicion and gap of every sensor; nu_i = 0 where the sample is missing. */
-static void innovate(blw_decentral_t *self, const blw_real_t *y, blw_mask_t used)
+/* The sample of a sensor is there. */
+static void hear(blw_decentral_t *self, size_t i, blw_real_t y_i)
 {
-    const blw_decentral_model_t *const model = self->model;
-    const blw_plant_t *const           plant = model->head.plant;
+    const blw_plant_t *const plant = self->model->head.plant;
+    const blw_real_t         y_bar = blw_la_dot(plant->n, &plant->C[i * plant->n], self->x_bar);
+    const blw_real_t         nu    = (y_i - plant->offset[i]) - y_bar;
+    const blw_real_t         e     = blw_la_abs(nu) * self->model->scale[i];
 
-    for (size_t i = 0U; i < plant->m; i++) {
-        if (((used >> i) & 1U) == 0U) {
-            self->nu[i]        = BLW_R(0.0);
-            self->suspicion[i] = BLW_R(1.0);
-            if (self->gap[i] <= (blw_real_t)model->max_gap) {
-                self->gap[i] += BLW_R(1.0);
-            }
-            continue;
-        }
-        const blw_real_t nu =
-            (y[i] - plant->offset[i]) - blw_la_dot(plant->n, &plant->C[i * plant->n], self->x_bar);
-        const blw_real_t e = blw_la_abs(nu) * model->scale[i];
-        self->nu[i]        = (e > INNOVATION_MAX) ? (nu * (INNOVATION_MAX / e)) : nu;
-        self->suspicion[i] = blw_step_suspicion(e * e);
-        self->gap[i]       = BLW_R(0.0);
-    }
+    self->nu[i]        = (e > INNOVATION_MAX) ? (nu * (INNOVATION_MAX / e)) : nu;
+    self->suspicion[i] = blw_step_suspicion(e * e);
+    self->gap[i]       = BLW_R(0.0);
 }
 
-/* Sensors that have been missing for longer than a filter should coast. */
-static blw_mask_t silent_sensors(const blw_decentral_t *self)
+/* nu_i, suspicion and gap of every sensor; nu_i = 0 where the sample is missing.
+ * @return the sensors that have been missing for longer than a filter should coast */
+static blw_mask_t innovate(blw_decentral_t *self, const blw_real_t *y, blw_mask_t used)
 {
-    blw_mask_t silent = 0U;
+    const blw_real_t max_gap = (blw_real_t)self->model->max_gap;
+    blw_mask_t       silent  = 0U;
+    blw_mask_t       bit     = 1U;
 
     for (size_t i = 0U; i < self->model->head.plant->m; i++) {
-        if (self->gap[i] > (blw_real_t)self->model->max_gap) {
-            silent |= (blw_mask_t)1U << i;
+        if ((used & bit) != 0U) {
+            hear(self, i, y[i]);
+        } else {
+            self->nu[i]        = BLW_R(0.0);
+            self->suspicion[i] = BLW_R(1.0);
+            if (self->gap[i] < max_gap) {
+                self->gap[i] += BLW_R(1.0);
+            } else {
+                silent |= bit;
+            }
         }
+        bit <<= 1;
     }
     return silent;
 }
@@ -176,44 +180,67 @@ static BLW_COLD blw_mask_t needed_of(const blw_decentral_t *self, blw_mask_t sil
     return spare ? silent : (silent & blw_decentral_members(self->model->sets, self->set));
 }
 
+/* The estimate without the sensors that are left out.  @return their g_J */
+static blw_real_t fuse(blw_decentral_t *self)
+{
+    const blw_real_t g = self->model->gains->statistic(self, self->set);
+
+    self->model->gains->estimate(self, self->set);
+    return g;
+}
+
+static bool fits(blw_decentral_t *self, size_t set, blw_real_t slack)
+{
+    const blw_real_t g = self->model->gains->statistic(self, set);
+
+    return g <= (slack * blw_decentral_threshold(self->model, set));
+}
+
+/* Where every set with the silent sensors is far off, what these told last may say who lies. */
+static BLW_COLD size_t best_set(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared)
+{
+    const size_t best = blw_decentral_search(self, needed, compared);
+
+    if ((needed == 0U) || fits(self, best, FAR_OFF)) {
+        return best;
+    }
+    uint16_t     others = 0U;
+    const size_t other  = blw_decentral_search(self, 0U, &others);
+
+    *compared = (uint16_t)(*compared + others);
+    return fits(self, other, BLW_R(1.0)) ? other : best;
+}
+
 static blw_outcome_t search(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared)
 {
-    const size_t     best = blw_decentral_search(self, needed, compared);
-    const blw_real_t g    = self->model->gains->statistic(self, best);
+    const size_t best = best_set(self, needed, compared);
 
     if (best != self->set) {
         exclude(self, best);
     }
-    self->model->gains->estimate(self, best);
-    return (g <= blw_decentral_threshold(self->model, best)) ? BLW_OUTCOME_CONVERGED
-                                                             : BLW_OUTCOME_HELD;
-}
-
-static bool warming_up(const blw_decentral_t *self)
-{
-    return (self->k <= self->model->warm_up) || !self->usable;
+    return (fuse(self) <= blw_decentral_threshold(self->model, best)) ? BLW_OUTCOME_CONVERGED
+                                                                      : BLW_OUTCOME_HELD;
 }
 
 /* Fusion, test and choice of the set; fills in what *out says about them. */
-static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_estimator_out_t *out)
+static blw_outcome_t decide(blw_decentral_t *self, blw_mask_t used, blw_mask_t silent,
+                            blw_estimator_out_t *out)
 {
-    const blw_decentral_model_t *const model  = self->model;
-    const blw_mask_t                   silent = silent_sensors(self);
+    const blw_decentral_model_t *const model = self->model;
 
     out->threshold = blw_decentral_threshold(model, 0U);
     leave_out_silent(self, silent);
-    const blw_real_t g = self->model->gains->statistic(self, self->set);
-    self->model->gains->estimate(self, self->set);
-    out->statistic  = (self->set == 0U) ? g : self->model->gains->all_statistic(self, self->set);
-    const bool pass = out->statistic <= out->threshold;
+    const blw_real_t g = fuse(self);
+    out->statistic     = (self->set == 0U) ? g : self->model->gains->all_statistic(self, self->set);
+    const bool pass    = out->statistic <= out->threshold;
     count_passes(self, pass, used);
-    if (warming_up(self)) {
+    if ((self->k <= model->warm_up) || !self->usable) {
+        out->flags = BLW_FLAG_WARMING_UP;
         return BLW_OUTCOME_KALMAN;
     }
     if ((self->set != 0U) && (model->readmit > 0U) && (self->passes >= model->readmit)) {
         exclude(self, 0U);
-        (void)self->model->gains->statistic(self, 0U);
-        self->model->gains->estimate(self, 0U);
+        (void)fuse(self);
         return BLW_OUTCOME_KALMAN;
     }
     const blw_mask_t needed  = needed_of(self, silent);
@@ -233,16 +260,16 @@ static blw_mask_t update(blw_decentral_t *self, blw_mask_t used)
     const size_t n  = self->model->head.plant->n;
     const size_t mu = self->model->mu;
 
-    blw_la_copy(n, self->x_bar, self->x_hat);
-    blw_la_axpy(n, BLW_R(1.0), self->dx, self->x_hat);
+    blw_la_sum(n, self->x_bar, self->dx, self->x_hat);
     if (!blw_la_bounded(n, self->x_hat)) {
         blw_la_copy(n, self->x_bar, self->x_hat);
-        blw_la_fill(mu, BLW_R(0.0), self->delta);
+        blw_la_zero(mu, self->delta);
         return 0U;
     }
-    for (size_t row = 0U; row < mu; row++) {
-        self->delta[row] -= blw_la_dot(n, &self->model->Phi[row * n], self->dx);
+    for (size_t j = 0U; j < n; j++) { /* delta -= Phi dx; the next fusion forms dx anew */
+        self->dx[j] = -self->dx[j];
     }
+    blw_la_gemv_add(mu, n, self->model->Phi, self->dx, self->delta);
     return used;
 }
 
@@ -254,10 +281,7 @@ static void report(const blw_decentral_t *self, blw_outcome_t outcome, blw_mask_
     out->excluded  = blw_decentral_members(self->model->sets, self->set);
     out->used      = used;
     out->outcome   = (uint8_t)outcome;
-    out->flags     = blw_step_flags(self->model->head.plant, used, out->excluded);
-    if (warming_up(self)) {
-        out->flags = (uint8_t)(out->flags | BLW_FLAG_WARMING_UP);
-    }
+    out->flags |= blw_step_flags(self->model->head.plant, used, out->excluded);
 }
 
 blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, const blw_real_t *y,
@@ -273,12 +297,14 @@ blw_status_t blw_decentral_step(blw_decentral_t *self, const blw_real_t *u, cons
     }
     blw_mask_t used = blw_plant_screen(plant, y, valid);
 
-    *out = (blw_estimator_out_t){0};
+    out->bound      = BLW_R(0.0);
+    out->iterations = 0U;
+    out->flags      = 0U;
     self->k += (self->k <= self->model->warm_up) ? 1U : 0U;
     blw_plant_predict(plant, self->x_hat, u, self->x_bar);
-    innovate(self, y, used);
+    const blw_mask_t silent = innovate(self, y, used);
     self->model->gains->advance(self);
-    const blw_outcome_t outcome = decide(self, used, out);
+    const blw_outcome_t outcome = decide(self, used, silent, out);
     count_calm(self);
     if ((self->model->reseed != 0U) && (self->calm >= CALM_STEPS)
         && !(out->statistic <= out->threshold)) {

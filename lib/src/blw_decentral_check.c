@@ -36,50 +36,32 @@ static bool sets_ok(const blw_decentral_model_t *model)
     const blw_decentral_sets_t *const sets = model->sets;
 
     if ((sets->n_sets == 0U) || (sets->parent == NULL) || (sets->sensor == NULL)
-        || ((sets->n_candidates > 0U) && (sets->candidate == NULL)) || (sets->parent[0] != 0U)) {
+        || (model->ranking->removed == NULL) || (sets->parent[0] != 0U)) {
         return false;
     }
-    for (size_t set = 1U; set < sets->n_sets; set++) {
-        if (!set_ok(model, set)) {
-            return false;
-        }
-    }
-    for (size_t i = 0U; i < sets->n_candidates; i++) {
-        if (sets->candidate[i] >= sets->n_sets) {
+    for (size_t set = 0U; set < sets->n_sets; set++) {
+        if (((set > 0U) && !set_ok(model, set))
+            || (blw_decentral_place(model, set) >= model->ranking->n_dof)) {
             return false;
         }
     }
     return true;
 }
 
-/* Number of the entry of `removed` for a set, at most n_dof. */
-static size_t place_of(const blw_decentral_model_t *model, size_t set)
+static bool candidates_ok(const blw_decentral_model_t *model)
 {
-    const size_t rows  = blw_decentral_rows(model, set);
-    size_t       place = 0U;
-
-    while ((place < model->ranking->n_dof) && (model->ranking->removed[place] != rows)) {
-        place++;
-    }
-    return place;
-}
-
-static bool ranking_ok(const blw_decentral_model_t *model)
-{
-    const blw_decentral_ranking_t *const ranking = model->ranking;
     const blw_decentral_sets_t *const    sets    = model->sets;
+    const blw_decentral_ranking_t *const ranking = model->ranking;
+    const bool                           ranked  = ranking->n_ranked > 0U;
 
-    if ((ranking->removed == NULL) || (ranking->n_ranked > ranking->n_dof)
-        || ((ranking->n_ranked > 0U) && (ranking->n_knots < 2U))) {
+    if ((ranking->n_ranked > ranking->n_dof) || (ranked && (ranking->n_knots < 2U))
+        || ((sets->n_candidates > 0U) && (sets->candidate == NULL))) {
         return false;
     }
-    for (size_t set = 0U; set < sets->n_sets; set++) {
-        if (place_of(model, set) >= ranking->n_dof) {
-            return false;
-        }
-    }
-    for (size_t i = 0U; (ranking->n_ranked > 0U) && (i < sets->n_candidates); i++) {
-        if (place_of(model, sets->candidate[i]) >= ranking->n_ranked) {
+    for (size_t i = 0U; i < sets->n_candidates; i++) {
+        const size_t set = sets->candidate[i];
+        if ((set >= sets->n_sets)
+            || (ranked && (blw_decentral_place(model, set) >= ranking->n_ranked))) {
             return false;
         }
     }
@@ -132,7 +114,7 @@ BLW_COLD blw_status_t blw_decentral_check(const blw_decentral_model_t *model)
     if (status != BLW_OK) {
         return status;
     }
-    if (!sizes_ok(model) || !sets_ok(model) || !ranking_ok(model)) {
+    if (!sizes_ok(model) || !sets_ok(model) || !candidates_ok(model)) {
         return BLW_ERR_MODEL;
     }
     add_common(model, &check);

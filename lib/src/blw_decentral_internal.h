@@ -40,6 +40,8 @@ blw_status_t blw_decentral_check(const blw_decentral_model_t *model);
 blw_mask_t blw_decentral_members(const blw_decentral_sets_t *sets, size_t set);
 /** Local states of a set. */
 size_t blw_decentral_rows(const blw_decentral_model_t *model, size_t set);
+/** Place of a set's degrees of freedom in the ranking, n_dof if it has none. */
+size_t blw_decentral_place(const blw_decentral_model_t *model, size_t set);
 /** Threshold of the statistic of the sensors that are not in a set. */
 blw_real_t blw_decentral_threshold(const blw_decentral_model_t *model, size_t set);
 /** g + c(g): the smallest one is the most plausible. */

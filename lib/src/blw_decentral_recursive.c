@@ -80,7 +80,7 @@ static BLW_COLD void reset(blw_decentral_t *self)
     const size_t n     = self->model->head.plant->n;
     const size_t width = width_of(self->model);
 
-    blw_la_fill(mu * width, BLW_R(0.0), self->X);
+    blw_la_zero(mu * width, self->X);
     for (size_t row = 0U; row < mu; row++) {
         blw_la_copy(n, &self->model->recursive->L0[row * n], &self->X[row * width]);
     }
@@ -99,7 +99,7 @@ static void predict_factor(blw_decentral_t *self, size_t sensor, const blw_real_
 
     for (size_t r = 0U; r < mu; r++) {
         blw_real_t *const row = &self->X[(first + r) * width];
-        blw_la_fill(width, BLW_R(0.0), row);
+        blw_la_zero(width, row);
         for (size_t b = 0U; b < mu; b++) {
             blw_la_axpy(first + b + 1U, S[(r * mu) + b], &self->L[blw_la_packed_row(first + b)],
                         row);
@@ -121,7 +121,7 @@ static void correct_factor(blw_decentral_t *self, size_t sensor)
     const blw_real_t *const            E     = &model->recursive->E[blw_la_packed_row(sensor)];
     blw_real_t *const                  a     = self->w;
 
-    blw_la_fill(used, BLW_R(0.0), a);
+    blw_la_zero(used, a);
     for (size_t r = 0U; r < mu; r++) {
         blw_la_axpy(used, t[r], &self->X[(first + r) * width], a);
     }
@@ -164,7 +164,7 @@ static size_t whiten_columns(blw_decentral_t *self, size_t set)
     for (size_t rest = set; rest != 0U; rest = model->sets->parent[rest]) {
         const size_t sensor = model->sets->sensor[rest];
         for (size_t r = model->first[sensor]; r < model->first[sensor + 1U]; r++) {
-            blw_la_fill(mu, BLW_R(0.0), &self->X[columns * mu]);
+            blw_la_zero(mu, &self->X[columns * mu]);
             self->X[(columns * mu) + r] = BLW_R(1.0);
             columns++;
         }

@@ -31,17 +31,16 @@ void blw_decentral_leave_out(blw_decentral_t *self, size_t set)
     blw_la_copy(model->mu, self->delta, self->z);
     for (size_t rest = set; rest != 0U; rest = model->sets->parent[rest]) {
         const size_t sensor = model->sets->sensor[rest];
-        blw_la_fill(blw_decentral_mu(model, sensor), BLW_R(0.0), &self->z[model->first[sensor]]);
+        blw_la_zero(blw_decentral_mu(model, sensor), &self->z[model->first[sensor]]);
     }
 }
 
-/* Place of the set's degrees of freedom in the ranking; init() made sure that there is one. */
-static size_t place_of(const blw_decentral_model_t *model, size_t set)
+size_t blw_decentral_place(const blw_decentral_model_t *model, size_t set)
 {
     const size_t rows  = blw_decentral_rows(model, set);
     size_t       place = 0U;
 
-    while (model->ranking->removed[place] != rows) {
+    while ((place < model->ranking->n_dof) && (model->ranking->removed[place] != rows)) {
         place++;
     }
     return place;
@@ -49,7 +48,7 @@ static size_t place_of(const blw_decentral_model_t *model, size_t set)
 
 blw_real_t blw_decentral_threshold(const blw_decentral_model_t *model, size_t set)
 {
-    return model->ranking->thr[place_of(model, set)];
+    return model->ranking->thr[blw_decentral_place(model, set)];
 }
 
 /* c(g): linear between the knots, constant outside. */
@@ -77,7 +76,7 @@ blw_real_t blw_decentral_score(const blw_decentral_model_t *model, size_t set, b
     if (model->ranking->n_ranked == 0U) {
         return g;
     }
-    return g + offset_of(model->ranking, place_of(model, set), g);
+    return g + offset_of(model->ranking, blw_decentral_place(model, set), g);
 }
 
 size_t blw_decentral_search(blw_decentral_t *self, blw_mask_t needed, uint16_t *compared)

@@ -61,9 +61,9 @@ static void restart(blw_joint_t *self)
 {
     const size_t r = self->model->r;
 
-    blw_la_fill(r * self->plant.n, BLW_R(0.0), self->delta);
-    blw_la_fill(r, BLW_R(0.0), self->theta);
-    blw_la_fill(r, BLW_R(0.0), self->phi);
+    blw_la_zero(r * self->plant.n, self->delta);
+    blw_la_zero(r, self->theta);
+    blw_la_zero(r, self->phi);
     self->heard = 0U;
     if (self->model->schedule != NULL) {
         blw_joint_schedule_reset(self);
@@ -148,8 +148,7 @@ static blw_mask_t update(blw_joint_t *self, blw_mask_t heard, bool sound)
 {
     const size_t n = self->plant.n;
 
-    blw_la_copy(n, self->x_bar, self->x_hat);
-    blw_la_axpy(n, BLW_R(1.0), self->dx, self->x_hat);
+    blw_la_sum(n, self->x_bar, self->dx, self->x_hat);
     for (size_t i = 0U; i < self->model->r; i++) {
         blw_la_axpy(n, BLW_R(-1.0), self->dx, &self->delta[i * n]);
     }

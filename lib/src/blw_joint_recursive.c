@@ -51,8 +51,8 @@ BLW_COLD void blw_joint_recursive_reset(blw_joint_t *self)
     const size_t n    = self->plant.n;
     const size_t rows = BLW_JOINT_ROWS(n, self->model->r);
 
-    blw_la_fill(blw_la_packed_row(rows), BLW_R(0.0), self->L);
-    blw_la_fill(rows, BLW_R(0.0), self->c);
+    blw_la_zero(blw_la_packed_row(rows), self->L);
+    blw_la_zero(rows, self->c);
     for (size_t i = 0U; i < self->model->r; i++) {
         for (size_t a = 0U; a < n; a++) {
             const size_t row = (i * (n + 2U)) + a;
@@ -79,7 +79,7 @@ static void predict_rows(blw_joint_t *self, const columns_t *at, size_t i)
     const blw_real_t  sd    = self->model->recursive->theta_sd[i];
     blw_real_t *const first = &self->X[base * at->width];
 
-    blw_la_fill((n + 2U) * at->width, BLW_R(0.0), first);
+    blw_la_zero((n + 2U) * at->width, first);
     for (size_t a = 0U; a < n; a++) {
         blw_real_t *const row = &first[a * at->width];
         for (size_t b = 0U; b < n; b++) {
@@ -104,7 +104,7 @@ static void sample_row(const blw_joint_t *self, const columns_t *at, size_t i, s
     const size_t            sensor = self->model->sensor[self->model->first[i] + j];
     const blw_real_t *const first  = &self->X[i * (n + 2U) * at->width];
 
-    blw_la_fill(at->width, BLW_R(0.0), Y);
+    blw_la_zero(at->width, Y);
     blw_la_copy(sensor + 1U, &self->model->recursive->E[blw_la_packed_row(sensor)], &Y[at->v]);
     for (size_t a = 0U; a < n; a++) {
         blw_la_axpy(at->width, self->plant.C[(sensor * n) + a], &first[a * at->width], Y);
@@ -248,7 +248,7 @@ static void fusion_row(const blw_joint_t *self, const columns_t *at, size_t i, s
     const size_t n     = self->plant.n;
     const size_t value = at->w;
 
-    blw_la_fill(value + 2U, BLW_R(0.0), row);
+    blw_la_zero(value + 2U, row);
     add_row(self, at, i, (i * (n + 2U)) + a, BLW_R(1.0), row);
     row[value] = self->delta[(i * n) + a];
     if (i != ref) {

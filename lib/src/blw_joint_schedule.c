@@ -20,7 +20,7 @@ static void correct_local(blw_joint_t *self, size_t i, const blw_real_t *K, blw_
     blw_real_t            theta = BLW_R(0.0);
     blw_real_t            phi   = BLW_R(0.0);
 
-    blw_la_fill(n, BLW_R(0.0), move);
+    blw_la_zero(n, move);
     for (size_t j = 0U; j < m_i; j++) {
         if (!blw_joint_in(heard, list[j])) {
             continue;

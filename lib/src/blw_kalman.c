@@ -71,7 +71,7 @@ static bool quick_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_t
         return false;
     }
     if (!self->calm) {
-        blw_la_fill(self->model->head.plant->m, BLW_R(0.0), self->suspicion);
+        blw_la_zero(self->model->head.plant->m, self->suspicion);
         self->calm = true;
     }
     return true;
@@ -108,7 +108,7 @@ static bool closed_step(blw_kalman_t *self, const blw_real_t *u, const blw_real_
         return false;
     }
     blw_la_copy(plant->n, self->x_bar, self->x_hat);
-    blw_la_fill(plant->m, BLW_R(0.0), self->suspicion);
+    blw_la_zero(plant->m, self->suspicion);
     self->calm = true;
     return true;
 }

@@ -10,24 +10,21 @@ typedef uint64_t real_bits_t;
 typedef uint32_t real_bits_t;
 #endif
 
-/* CRC-32 of IEEE 802.3 (zlib), reflected polynomial 0xEDB88320, four bits at a time: init only, so
- * 64 bytes of table are the better bargain. */
-static const uint32_t crc_nibble[16] = {
-    0x00000000U, 0x1DB71064U, 0x3B6E20C8U, 0x26D930ACU, 0x76DC4190U, 0x6B6B51F4U,
-    0x4DB26158U, 0x5005713CU, 0xEDB88320U, 0xF00F9344U, 0xD6D6A3E8U, 0xCB61B38CU,
-    0x9B64C2B0U, 0x86D3D2D4U, 0xA00AE278U, 0xBDBDF21CU,
-};
+/* CRC-32 of IEEE 802.3 (zlib), reflected polynomial. */
+#define CRC_POLYNOMIAL 0xEDB88320U
 
-/* Takes the number byte by byte from the low end, so that the sum is the same on every target. */
-static uint32_t crc_real(uint32_t crc, blw_real_t value)
+/* Takes the number bit by bit from the low end, so that the sum is the same on every target; init
+ * only, so that a table would cost more than it saves. */
+static BLW_COLD uint32_t crc_real(uint32_t crc, blw_real_t value)
 {
     real_bits_t bits;
 
     (void)memcpy(&bits, &value, sizeof bits);
     crc = ~crc;
-    for (size_t nibble = 0U; nibble < (2U * sizeof bits); nibble++) {
-        crc = (crc >> 4) ^ crc_nibble[(crc ^ (uint32_t)bits) & 0xFU];
-        bits >>= 4;
+    for (size_t bit = 0U; bit < (8U * sizeof bits); bit++) {
+        const bool odd = ((crc ^ (uint32_t)bits) & 1U) != 0U;
+        crc            = (crc >> 1) ^ (odd ? CRC_POLYNOMIAL : 0U);
+        bits >>= 1;
     }
     return ~crc;
 }
@@ -112,14 +109,16 @@ bool blw_plant_input_ok(const blw_plant_t *plant, const blw_real_t *u)
 
 blw_mask_t blw_plant_screen(const blw_plant_t *plant, const blw_real_t *y, blw_mask_t valid)
 {
-    blw_mask_t used = valid & BLW_MASK_ALL(plant->m);
+    blw_mask_t used = 0U;
+    blw_mask_t bit  = 1U;
 
     for (size_t i = 0U; i < plant->m; i++) {
         const bool in_range = (y[i] >= plant->y_min[i]) && (y[i] <= plant->y_max[i]);
 
-        if (!in_range || !(blw_la_abs(y[i]) <= BLW_SIGNAL_MAX)) {
-            used &= ~((blw_mask_t)1U << i);
+        if (in_range && (blw_la_abs(y[i]) <= BLW_SIGNAL_MAX)) {
+            used |= valid & bit;
         }
+        bit <<= 1;
     }
     return used;
 }

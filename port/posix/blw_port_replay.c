@@ -37,6 +37,18 @@ static bool take_letter(const char **text, char letter)
     return there;
 }
 
+/* Nothing more on the line but the direction that some programs write: " R" or " T". */
+static bool is_end(const char *text)
+{
+    const size_t spaces = strspn(text, " ");
+
+    text += spaces;
+    if ((spaces > 0U) && ((*text == 'R') || (*text == 'T'))) {
+        text++;
+    }
+    return strspn(text, " \r\n") == strlen(text);
+}
+
 /* "2A36": classic; "#12A36": FD with its flags. */
 static bool read_data(const char *text, blw_frame_t *frame)
 {
@@ -55,7 +67,7 @@ static bool read_data(const char *text, blw_frame_t *frame)
         count++;
     }
     frame->len = (uint8_t)count;
-    return strspn(text, " \r\n") == strlen(text);
+    return is_end(text);
 }
 
 /* "(1436509052.249713) vcan0 101#..." */

@@ -244,15 +244,46 @@ static void test_step_given_two_silent_sensors_leaves_both_out(void)
 
 static void test_step_given_a_silent_sensor_keeps_it_out_in_a_search(void)
 {
+    const blw_real_t y[3] = {BLW_R(1.0), BLW_R(42.0), BLW_R(103.0)};
+
+    for (size_t k = 0U; k < 3U; k++) {
+        step(calm, 6U);
+    }
+    step(y, 6U); /* no two of the three agree, 0 and 1 least badly: it is {0}, which was silent */
+    TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    TEST_ASSERT_EQUAL_UINT(4U, out.iterations);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
+}
+
+static void test_step_given_a_misfit_that_is_not_gross_leaves_the_silent_sensor_out(void)
+{
+    blw_real_t lie = BLW_R(0.0);
+
+    for (size_t k = 0U; k < 3U; k++) {
+        step(calm, 6U);
+    }
+    while (out.outcome != (uint8_t)BLW_OUTCOME_HELD) { /* the least that {0} does not explain */
+        const blw_real_t y[3] = {BLW_R(1.0), BLW_R(2.0), BLW_R(3.0) + lie};
+        lie += BLW_R(0.25);
+        TEST_ASSERT_TRUE(lie < BLW_R(100.0));
+        step(y, 6U);
+        TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
+    }
+    TEST_ASSERT_EQUAL_UINT(1U, out.iterations);
+}
+
+static void test_step_given_a_liar_beside_a_silent_sensor_believes_what_that_told_last(void)
+{
     const blw_real_t y[3] = {BLW_R(1.0), BLW_R(2.0), BLW_R(103.0)};
 
     for (size_t k = 0U; k < 3U; k++) {
         step(calm, 6U);
     }
-    step(y, 6U); /* which of 1 and 2 lies cannot be told: only {0} contains what is silent */
     TEST_ASSERT_EQUAL_HEX64(1U, out.excluded);
-    TEST_ASSERT_EQUAL_UINT(1U, out.iterations);
-    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_HELD, out.outcome);
+    step(y, 6U); /* 1 and 2 disagree, and 0, silent for 4 steps, was where 1 is */
+    TEST_ASSERT_EQUAL_HEX64(4U, out.excluded);
+    TEST_ASSERT_EQUAL_INT(BLW_OUTCOME_CONVERGED, out.outcome);
+    TEST_ASSERT_REAL_WITHIN(SUPPORT_TOL, 0.0, out.x_hat[0]);
 }
 
 static void test_step_given_silence_and_no_set_that_holds_it_searches_every_step(void)
@@ -390,6 +421,8 @@ int main(void)
     RUN_TEST(test_step_given_a_long_gap_leaves_the_sensor_out_until_it_passes);
     RUN_TEST(test_step_given_two_silent_sensors_leaves_both_out);
     RUN_TEST(test_step_given_a_silent_sensor_keeps_it_out_in_a_search);
+    RUN_TEST(test_step_given_a_misfit_that_is_not_gross_leaves_the_silent_sensor_out);
+    RUN_TEST(test_step_given_a_liar_beside_a_silent_sensor_believes_what_that_told_last);
     RUN_TEST(test_step_given_silence_and_no_set_that_holds_it_searches_every_step);
     RUN_TEST(test_step_given_silence_elsewhere_replaces_an_excluded_sensor_that_is_calm);
     RUN_TEST(test_step_given_no_sample_predicts_and_says_so);

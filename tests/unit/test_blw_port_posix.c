@@ -160,7 +160,7 @@ static void test_serial_open_given_no_such_place_refuses(void)
 
 static void test_replay_given_a_log_yields_its_frames_in_its_time(void)
 {
-    static const char text[] = "(100.000001) vcan0 101#0102\n"
+    static const char text[] = "(100.000001) vcan0 101#0102 R\r\n"
                                "(100.000003) vcan0 090##10A0B0C0D0E0F000102030405\n"
                                "(100.000004) vcan0 12345678#00\n"
                                "(100.000005) vcan0 123#R\n"
@@ -172,7 +172,8 @@ static void test_replay_given_a_log_yields_its_frames_in_its_time(void)
                                "(100.000005) vcan0 101#000102030405060708\n"
                                "(100.000005) vcan0 101##\n"
                                "(100.000005) vcan0 101\n"
-                               "(100.000002) vcan0 7FF#\n";
+                               "(100.000005) vcan0 101#00 X\n"
+                               "(100.000002) vcan0 7FF# T\n";
     char              path[] = "/tmp/blw_replay.XXXXXX";
     const int         fd     = mkstemp(path);
     blw_port_replay_t port;
@@ -196,7 +197,7 @@ static void test_replay_given_a_log_yields_its_frames_in_its_time(void)
     TEST_ASSERT_EQUAL_UINT64(100000003U, frame.t_us); /* time does not go back */
     TEST_ASSERT_FALSE(blw_port_recv(&port.base, &frame));
     TEST_ASSERT_TRUE(port.ended);
-    TEST_ASSERT_EQUAL_UINT64(10U, port.skipped);
+    TEST_ASSERT_EQUAL_UINT64(11U, port.skipped);
     TEST_ASSERT_TRUE(blw_port_send(&port.base, &frame));
     blw_port_replay_close(&port);
     TEST_ASSERT_TRUE(blw_port_replay_open(&port, "/nonexistent/log") > 0);

@@ -73,8 +73,8 @@ typedef struct blw_decentral_steady {
     const blw_real_t *H;   /**< per sensor R_i^-1 of N_i = Q_i R_i, transposed, packed lower; NULL
                                 unless reseed */
     const uint16_t   *at;  /**< [n_sets + 1] where the part of a set in M begins */
-    const blw_real_t *M;   /**< per set of r rows and last sensor b: X [mu_b x (r - mu_b)], T packed
-                                lower [mu_b (mu_b + 1) / 2]; nothing for sets of one sensor */
+    const blw_real_t *M;   /**< per set whose last sensor is b: [X T], mu_b rows that grow to the
+                                set's length by one number each; nothing for sets of one sensor */
 } blw_decentral_steady_t;
 
 /** Tables of gains from a recursion. */
@@ -114,7 +114,7 @@ typedef struct blw_decentral {
     blw_real_t                  *x_bar;     /* [n] */
     blw_real_t                  *dx;        /* [n] x_hat - x_bar */
     blw_real_t                  *nu;        /* [m] innovations */
-    blw_real_t                  *gap;       /* [m] steps missing in a row, to max_gap + 1: small
+    blw_real_t                  *gap;       /* [m] steps missing in a row, to max_gap: small
                                                integers, exact in blw_real_t */
     blw_real_t                  *suspicion; /* [m] */
     blw_real_t                  *delta;     /* [mu] */

@@ -24,7 +24,7 @@ typedef uint64_t blw_mask_t;
 #define BLW_MASK_ALL(m) (~(blw_mask_t)0 >> (BLW_MAX_SENSORS - (m)))
 
 /** Layout version of the tables and width of blw_real_t: a float library refuses a double table. */
-#define BLW_MODEL_ABI ((uint16_t)(0x0100U + sizeof(blw_real_t)))
+#define BLW_MODEL_ABI ((uint16_t)(0x0200U + sizeof(blw_real_t)))
 
 /** One of two checksums, for tables that are compiled as float or as double. */
 #ifdef BLW_REAL_DOUBLE
