@@ -44,6 +44,12 @@ def test_basis_given_a_hidden_part_leaves_it_out_in_any_coordinates():
     assert observable_basis(T @ A @ np.linalg.inv(T), c @ np.linalg.inv(T)).shape == (7, seen)
 
 
+@pytest.mark.parametrize("rounding", [0.0, 1e-16, 1e-14])
+def test_basis_given_a_mode_that_only_rounding_splits_takes_it_as_one(rounding):
+    A = 0.95 * np.eye(2) + rounding * np.array([[0.0, -1.0], [0.5, 0.0]])
+    assert observable_basis(A, np.array([1.2, -1.9])).shape == (2, 1)
+
+
 def test_basis_given_a_sensor_of_nothing_refuses():
     with pytest.raises(DesignError, match="observes nothing"):
         observable_basis(np.eye(2), np.zeros(2))

@@ -285,9 +285,40 @@ def test_design_refuses_what_it_cannot_serve(C, p, options, message):
     assert message in str(error.value)
 
 
+def test_build_given_other_units_of_the_states_finds_the_same_inverses():
+    model, _ = named("pendulum")
+    units = np.geomspace(1e7, 1e-7, model.n)
+    other = replace(model, A=model.A * units[:, None] / units, B=model.B * units[:, None],
+                    C=model.C / units)
+    pairs = zip(bank_build.build(model, Options()).blocks,
+                bank_build.build(other, Options()).blocks, strict=True)
+    for block, rescaled in pairs:
+        assert rescaled.sensors == block.sensors
+        assert rescaled.Z / units[:, None] == pytest.approx(
+            block.Z, rel=0, abs=1e-12 * np.abs(block.Z).max())
+
+
+def test_design_given_a_state_without_noise_has_no_advice():
+    model = parse({"name": "still", "dt_s": 0.1, "attack": {"p": 1},
+                   "plant": {"A": [[0.5]], "C": [[1.0]] * 3, "Q": [0.0], "R": [1.0] * 3}}, "still")
+    info = bank.design(model, steady_state(model.A, model.C, model.W, model.R), Options()).info
+    assert (info["P_opt_max"], info["advice"]) == (0.0, None)
+
+
 def test_advice_names_a_longer_horizon_where_epsilon_is_large():
     model, kalman = named("pendulum")
     advice = bank.design(model, kalman, Options()).info["advice"]
     assert "horizon = 12 makes it 1.26 P_opt" in advice
     for name in ("drone5", "drone6"):
         assert bank.design(*named(name), Options()).info["advice"] is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_design_given_other_units_of_the_states_warns_of_nothing():
+    model, _ = named("drone5")
+    units = np.logspace(-3.0, 3.0, model.n)
+    other = replace(model, A=model.A * units[:, None] / units, B=model.B * units[:, None],
+                    Bu=model.Bu * units[:, None], C=model.C / units)
+    made = [bank.design(one, steady_state(one.A, one.C, one.W, one.R), Options())
+            for one in (model, other)]
+    assert made[1].info["warm_up_steps"] == made[0].info["warm_up_steps"]

@@ -349,6 +349,16 @@ def test_design_given_a_mode_without_noise_refuses():
         decentral.design(plant, filtered, Options())
 
 
+def test_design_given_states_in_very_different_units_serves_them():
+    plant, filtered = parse({
+        "A": [[0.9, 1.7e-3, 0.0], [0.0, 0.0, 3.7e4], [0.0, 0.0, 0.0]],
+        "C": [[0.026, 0.0, 17.3], [0.026, 0.0, 17.3], [0.0067, 0.0, 0.0], [0.0, -4.5e-4, -11.2],
+              [0.0, -5.1e-5, 39.5], [0.039, 0.0, -13.8], [-0.028, 4.1e-4, 0.0],
+              [0.0, -5.1e-5, -9.2]],
+        "Q": [2.6, 6.9e5, 6.3e-4], "R": [0.72, 5.1, 1.8, 9.3, 0.65, 1.5, 5.6, 0.37]}, p=2)
+    assert np.isfinite(decentral.design(plant, filtered, Options()).info["cond_P"])
+
+
 def test_design_given_no_redundancy_refuses():
     plant, filtered = parse({"A": [[0.9]], "C": [[1.0]], "Q": [1.0], "R": [1.0]}, p=0)
     with pytest.raises(DesignError, match="1 local states for 1 states: no redundancy"):

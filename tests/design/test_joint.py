@@ -175,7 +175,7 @@ def test_covariances_given_white_attacks_are_those_of_a_simulation():
             phi[i] += e @ step.gains.Gamma[i]
     fused = np.hstack([X[0, :, :4], X[1, :, :4]]) @ steps[-1].G - x
     spread = 5 * np.sqrt(2 / runs)
-    assert (fused**2).sum(axis=1).mean() == pytest.approx(steps[-1].trace, rel=spread)
+    assert (fused**2).sum(axis=1).mean() == pytest.approx(steps[-1].fused.sum(), rel=spread)
     for i in range(2):
         error = theta[:, i] - X[i, :, -1]
         assert (error**2).mean() == pytest.approx(steps[-1].theta[i], rel=spread)
@@ -246,6 +246,84 @@ def test_design_given_wrong_options_says_which(table, words):
     with pytest.raises(ModelError, match="method.joint") as caught:
         joint.design(*grid(**table))
     assert words in str(caught.value)
+
+
+def test_design_given_partners_that_a_detector_clears_counts_on_the_strong_ones_only():
+    pairs = [["y1", ["y2", "y4", "y5"]], ["y2", ["y1", "y4", "y5"]]]
+    made, found, parsed = grid(gains="recursive", pairs=pairs, eta=1.0)
+    some = joint.design(dataclasses.replace(made, strong=["y4", "y5"]), found, parsed)
+    fewer = grid(gains="recursive", pairs=[["y1", ["y4", "y5"]], ["y2", ["y4", "y5"]]], eta=1.0)[2]
+    want = joint.design(made, found, fewer)
+    assert some.info["pairs"] == pairs
+    assert some.tables.to_json()["sensor"] == [0, 1, 3, 4, 1, 0, 3, 4]
+    for key in ("threshold", "trace_P", "theta_sd", "verdict"):
+        assert some.info[key] == want.info[key], key
+
+
+def test_design_given_no_partner_that_is_strong_yet_says_so():
+    made, found, parsed = grid(gains="recursive", pairs=[["y1", ["y3", "y4"]]], eta=1.0)
+    A = np.diag([0.5, 0.6, 0.7, 0.8])
+    C = made.C.copy()
+    C[0] = 1.0
+    stable = dataclasses.replace(made, strong=["y5"], A=A, C=C)
+    info = joint.design(stable, found, parsed).info
+    assert "no partner is strong at the start" in info["verdict"]
+    assert len(info["unseen_by_partners"]) == 0
+
+
+def in_units(states, sensors, **table):
+    """A plant of two modes, four sensors and correlated noise in other units, powers of two."""
+    A = np.array([[0.9, 0.3, 0.1], [-0.2, 0.8, 0.0], [0.1, 0.0, 0.95]])
+    C = np.array([[1.0, 0.5, 0.2], [0.3, 1.0, -0.4], [0.8, -0.6, 1.0], [0.2, 0.9, 0.7]])
+    W = np.array([[1.0, 0.4, 0.2], [0.4, 0.5, 0.1], [0.2, 0.1, 0.3]])
+    R = 0.4 * np.eye(4) + 0.1
+    plant = {"A": (A * states[:, None] / states).tolist(),
+             "C": (C * sensors[:, None] / states).tolist(),
+             "Q": (W * np.outer(states, states)).tolist(),
+             "R": (R * np.outer(sensors, sensors)).tolist()}
+    made = models.parse({"name": "units", "dt_s": 1.0, "plant": plant,
+                         "attack": {"strong": ["y3", "y4"]}}, "units")
+    found = kalman.steady_state(made.A, made.C, made.W, made.R)
+    return joint.design(made, found, options.parse(joint.Options, table, "x"))
+
+
+STATES, SENSORS = np.array([2.0**13, 2.0**-13, 1.0]), np.array([2.0**-13, 2.0**10, 2.0**13, 1.0])
+
+
+def test_design_given_other_units_yields_the_same_schedule():
+    plain, scaled = in_units(np.ones(3), np.ones(4)), in_units(STATES, SENSORS)
+    want, found = (one.tables.to_json() for one in (plain, scaled))
+    steps = want["schedule"]["steps"]
+    assert (found["schedule"]["steps"], found["warm_up"]) == (steps, want["warm_up"])
+    G = np.reshape(found["schedule"]["G"], (steps, 3, 3)) / STATES[:, None] * STATES
+    np.testing.assert_allclose(G, np.reshape(want["schedule"]["G"], G.shape), atol=1e-4)
+    for i, weak in enumerate(SENSORS[:2]):
+        rows = np.append(STATES, [weak, weak])[:, None] / SENSORS[[i, 2, 3]]
+        K, wanted = (np.reshape(t["schedule"]["K"], (steps, 2, 5, 3))[:, i] for t in (found, want))
+        np.testing.assert_allclose(K / rows, wanted, atol=1e-9)
+    np.testing.assert_allclose(found["scale"] * SENSORS[:2], want["scale"], rtol=1e-6)
+
+
+@pytest.mark.filterwarnings("error")
+def test_design_given_other_units_finds_the_same_filters_to_compare_with():
+    sizes = [np.ones(3), np.full(3, 2.0**13)]
+    plain, scaled = (in_units(one, SENSORS).info for one in sizes)
+    mixed = in_units(STATES, SENSORS).info
+    for key in ("trace_P", "trace_P_no_attack", "trace_P_central_kalman"):
+        assert scaled[key] == pytest.approx(2.0**26 * plain[key], rel=1e-9)
+        assert np.isfinite(mixed[key])
+
+
+@pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0], [2, 1, 0]])
+def test_recursive_tables_given_mixed_units_hold_roots_of_the_covariances(order):
+    states = STATES[order]
+    tables = in_units(states, SENSORS, gains="recursive").tables.to_json()["recursive"]
+    plain = in_units(np.ones(3), np.ones(4), gains="recursive").tables.to_json()["recursive"]
+    lower = np.tril_indices(3)
+    np.testing.assert_allclose(tables["L0"] / states[lower[0]], plain["L0"], atol=1e-9)
+    V, wanted = (np.reshape(one["V"], (3, 3)) for one in (tables, plain))
+    V = V / states[:, None]
+    np.testing.assert_allclose(V @ V.T, wanted @ wanted.T, atol=1e-12)
 
 
 def test_design_given_no_strong_sensor_or_only_strong_ones_refuses():

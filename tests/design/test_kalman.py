@@ -53,6 +53,28 @@ def test_steady_state_given_scalar_random_walk_has_the_golden_gain():
     assert found.K[0, 0] == pytest.approx((np.sqrt(5) - 1) / 2, abs=1e-14)
 
 
+def test_steady_state_given_ill_conditioned_modes_in_any_units_finds_the_solution():
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        angle, T = rng.uniform(0.05, 1.5), rng.standard_normal((3, 3))
+        J = np.diag([np.cos(angle), np.cos(angle), 0.6])
+        J[0, 1], J[1, 0] = -np.sin(angle), np.sin(angle)
+        units = 10.0 ** rng.uniform(-4, 4, 3)
+        T *= units[:, None]
+        A, C = 0.94 * T @ J @ np.linalg.inv(T), rng.standard_normal((5, 3)) / units
+        W, R = np.diag(units**2 * 10.0 ** rng.uniform(-3, 0, 3)), np.diag(rng.uniform(1.0, 9.0, 5))
+        found = kalman.steady_state(A, C, W, R)
+        error = A @ found.P @ A.T + W - found.Pp
+        size = np.sqrt(np.diag(found.Pp))
+        assert np.abs(error / np.outer(size, size)).max() <= 1e-6
+
+
+def test_steady_state_given_a_mode_without_noise_has_no_negative_variance():
+    A, C = np.array([[0.901, 1.0], [0.0, 0.001]]), np.array([[-1.67, -2.41], [-1.69, -0.53]])
+    found = kalman.steady_state(A, C, np.diag([0.036, 0.0]), np.diag([0.26, 3.5]))
+    assert np.diag(found.Pp).min() >= 0.0
+
+
 def test_steady_state_given_correlated_R_minimises_the_trace():
     rng = np.random.default_rng(1)
     A = np.array([[0.9, 0.2], [0.0, 1.0]])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import ncx2
 
-from blw import chi2, design, guard, guard_fusion, guard_order, margin, model, options
+from blw import chi2, design, gaps, guard, guard_fusion, guard_order, margin, model, options
 from blw.decentral_filters import local_filters
 from blw.decentral_fusion import fuse
 from blw.errors import DesignError, ModelError
@@ -124,13 +124,12 @@ def test_decentral_given_the_worst_disturbance_alarms_as_often_as_designed():
 def test_rate_given_a_sensor_that_sends_seldom_weighs_its_samples():
     """In the long run a gain of K / q on a share q of the steps tells what K tells in all."""
     slow = car(rate=[1.0, 1.0, 0.25, 1.0, 1.0])
-    averaged = slow.averaged()
-    assert averaged.R[2, 2] == pytest.approx(4.0 * slow.R[2, 2])
-    np.testing.assert_array_equal(averaged.sample_R, slow.R)
-    K = steady_state(slow.A, slow.C, slow.W, averaged.R).K
+    served, kalman = gaps.averaged(slow)
+    S = slow.C @ kalman.Pp @ slow.C.T + slow.R
+    assert served.R[2, 2] == pytest.approx(slow.R[2, 2] + 3.0 * S[2, 2], rel=1e-9)
     found = np.array(tables(slow, ["kalman"])["kalman"]["tables"]["K"]).reshape(2, 5)
-    np.testing.assert_allclose(found[:, 2], 4.0 * K[:, 2], rtol=1e-12)
-    np.testing.assert_allclose(found[:, 0], K[:, 0], rtol=1e-12)
+    np.testing.assert_allclose(found[:, 2], 4.0 * kalman.K[:, 2], rtol=1e-12)
+    np.testing.assert_allclose(found[:, 0], kalman.K[:, 0], rtol=1e-12)
 
 
 def test_decentral_given_a_rate_waits_longer_for_the_sensor():
@@ -149,13 +148,6 @@ def test_decentral_given_a_rate_waits_longer_for_the_sensor():
 def test_model_given_a_wrong_rate_or_margin_refuses(plant, message):
     with pytest.raises(ModelError, match=message):
         car(**plant)
-
-
-def test_guard_given_a_rate_and_fast_modes_refuses():
-    fast = model.parse(CAR | {"plant": CAR["plant"] | {
-        "A": [[1.0, 0.02], [0.0, 0.3]], "rate": [0.5] * 5}}, "fast")
-    with pytest.raises(DesignError, match="guard: plant.rate needs modes"):
-        tables(fast, ["guard"])
 
 
 def test_decentral_given_a_rate_and_recursive_gains_refuses():

@@ -130,6 +130,7 @@ def test_design_given_json_prints_the_figures(tmp_path):
     assert figures["name"] == "liu5"
     assert figures["methods"]["kalman"]["trace_P"] == pytest.approx(0.8317, abs=5e-5)
     assert len(figures["files"]) == 4
+    assert figures["warnings"] == []
 
 
 def test_design_given_unknown_model_serves_it(tmp_path):
@@ -169,6 +170,30 @@ def test_design_given_method_that_refuses_says_why(tmp_path):
     assert "lasso      refused: " in done.stdout
     document = json.loads((tmp_path / "out" / "chain.json").read_text())
     assert "lasso" in document["refused"] and "kalman" in document["methods"]
+
+
+@pytest.mark.parametrize("attack, warned", [
+    ("p = 1", False), ("p = 2", True), ("p = 0", False), ('p = 2\nstrong = ["y2"]', False)])
+def test_design_given_more_attacked_than_the_sensors_bear_warns(tmp_path, attack, warned):
+    file = write(tmp_path, chain(2) + f"[attack]\n{attack}\n")
+    done = design(file, "--out", "out", "--method", "kalman", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert ("warning: p = 2, but the state follows from the sensors with at most 1 of them "
+            "attacked: too few see the mode 0.95; see bulwark analyze\n" in done.stdout) == warned
+
+
+@pytest.mark.parametrize("A, Q", [
+    ([[0.9, 0.5, 0.0], [0.0, 0.0, 0.5], [0.0, 0.0, 0.0]], [1e-3, 0.1, 0.0]),
+    ([[0.9, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.1]], [0.0, 0.0, 0.0])])
+def test_design_given_states_that_are_known_exactly_serves_them(tmp_path, A, Q):
+    C = [[0.6, -0.2, 2.2], [-0.2, 0.1, 0.2], [-0.5, 2.2, 0.1]]
+    file = write(tmp_path, f'name = "still"\ndt_s = 0.1\n[plant]\nA = {A}\nC = {C}\nQ = {Q}\n'
+                           "R = [0.1, 0.2, 0.1]\n")
+    done = design(file, "--out", "out", "--json", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (0, "")
+    figures = json.loads(done.stdout)["methods"]
+    assert figures["kalman"]["cond_P"] is None
+    assert {"kalman", "bank", "guard"} <= set(figures)
 
 
 def test_design_given_unknown_method_suggests_one(tmp_path):

@@ -17,6 +17,9 @@ Array = NDArray[np.float64]
 
 #: What is left of a Krylov vector after the projection, relative to it: below this it is rounding.
 BREAKDOWN = 1e-10
+#: The same relative to A itself, whose digits may be rounded: modes that only these tell apart are
+#: one.
+ROUNDING = 1e-12
 
 
 def observable_basis(A: Array, c: Array) -> Array:
@@ -29,12 +32,14 @@ def observable_basis(A: Array, c: Array) -> Array:
         raise DesignError("its row of C is zero: it observes nothing")
     balanced, (scale, _) = matrix_balance(A, permute=False, separate=True)
     shift = np.trace(A) / len(A)
-    columns = _krylov(balanced.T - shift * np.eye(len(A)), c * scale)
+    columns = _krylov(balanced.T - shift * np.eye(len(A)), c * scale,
+                      ROUNDING * np.linalg.norm(balanced, 2))
     return np.linalg.qr(columns / scale[:, None])[0]
 
 
-def _krylov(M: Array, start: Array) -> Array:
-    """Orthonormal basis [n, mu] of span{start, M start, M^2 start, ...}."""
+def _krylov(M: Array, start: Array, rounding: float) -> Array:
+    """Orthonormal basis [n, mu] of span{start, M start, M^2 start, ...}; M is known to within
+    `rounding`."""
     basis = (start / np.linalg.norm(start))[:, None]
     while basis.shape[1] < len(M):
         image = M @ basis[:, -1]
@@ -42,7 +47,7 @@ def _krylov(M: Array, start: Array) -> Array:
         for _ in range(2):  # twice is enough for orthogonality to rounding
             rest = rest - basis @ (basis.T @ rest)
         size = np.linalg.norm(rest)
-        if size <= BREAKDOWN * np.linalg.norm(image):
+        if size <= max(BREAKDOWN * np.linalg.norm(image), rounding):
             break
         basis = np.column_stack([basis, rest / size])
     return basis

@@ -18,7 +18,7 @@ from blw.model import Model
 from blw.tables import Struct, index, real, table
 
 NAME = "bank"
-AVERAGES = True
+GAPS = "weighted"
 
 CEILING = 1.5             # of an average over its threshold: it recovers in a third of the memory
 SETTLED = 0.01            # part of P_opt that the initial error may still hold
@@ -145,17 +145,18 @@ def _info(model: Model, options: Options, bank: Bank, warm_up: int) -> dict[str,
         "epsilon_max": epsilon,
         "guarantee": max(p_opt) + epsilon,
         "footprint": footprint(model, bank),
-        "advice": _advice(model, options, bank, epsilon / max(p_opt)),
+        "advice": _advice(model, options, bank, epsilon, max(p_opt)),
     }
 
 
-def _advice(model: Model, options: Options, bank: Bank, ratio: float) -> str | None:
+def _advice(model: Model, options: Options, bank: Bank, epsilon: float,
+            p_opt: float) -> str | None:
     """What twice the horizon would change, where epsilon is larger than P_opt and that helps."""
     longer = 2 * bank.horizon
-    if ratio <= 1.0 or longer > MAX_HORIZON or options.grouped:
+    if not 0.0 < p_opt < epsilon or longer > MAX_HORIZON or options.grouped:
         return None
+    ratio = epsilon / p_opt
     other = build(model, replace(options, horizon=longer))
-    p_opt = max(member.p_opt(options.version == "filter") for member in other.members)
     gain = max(test.epsilon for test in other.tests) / p_opt
     if gain > WORTHWHILE * ratio:
         return None

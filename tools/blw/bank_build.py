@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blw import bank_moments as moments
-from blw import margin
+from blw import gaps, margin
 from blw.errors import DesignError
-from blw.kalman import modes, steady_state, unseen
+from blw.kalman import modes, unseen
 from blw.model import Model
 
 MAX_SENSORS = 8           # BLW_BANK_MAX_SENSORS
@@ -125,7 +125,7 @@ def build(model: Model, options: Options) -> Bank:
     units = model.units
     noise = moments.Noise(model.A, model.C, model.W, model.R)
     filtered = options.version == "filter"
-    members = [_member(noise, sensors) for sensors in _unions(units, len(units) - model.p)]
+    members = [_member(model, sensors) for sensors in _unions(units, len(units) - model.p)]
     members.sort(key=lambda member: member.p_opt(filtered))
     blocks = _blocks(model, noise, options, _unions(units, theta))
     horizon = max(block.horizon for block in blocks)
@@ -165,10 +165,11 @@ def _unions(units: Sequence[Sequence[int]], size: int) -> list[Sensors]:
             for chosen in combinations(units, size)]
 
 
-def _member(noise: moments.Noise, sensors: Sensors) -> Member:
+def _member(model: Model, sensors: Sensors) -> Member:
     rows = list(sensors)
-    kalman = steady_state(noise.A, noise.C[rows], noise.W, noise.R[np.ix_(rows, rows)])
-    K = np.zeros((len(noise.W), len(noise.R)))
+    kalman, _ = gaps.steady(model.A, model.C[rows], model.W, model.sample_R[np.ix_(rows, rows)],
+                            model.weight[rows])
+    K = np.zeros((model.n, model.m))
     K[:, rows] = kalman.K
     return Member(sensors, K, kalman.P, kalman.Pp)
 
@@ -193,7 +194,8 @@ def _block(model: Model, noise: moments.Noise, subset: Sensors, how: tuple[int, 
     horizon, kind = how
     Z = moments.left_inverse(noise, subset, horizon, kind)
     O = moments.observability_matrix(model.A, model.C[list(subset)], horizon)
-    error = np.abs(Z @ O - np.eye(model.n)).max()
+    size = _state_sizes(O)
+    error = np.abs((Z @ O - np.eye(model.n)) * size[:, None] / size).max()
     if not error <= INVERSE_ERROR:
         raise DesignError(f"the left inverse of {_names(model, subset)} over {horizon} steps is "
                           f"wrong by {error:.3g}: choose another horizon")
@@ -211,21 +213,21 @@ def _observability_index(model: Model, subset: Sensors) -> int:
                               "bank needs every subset of its theta sensors to be observable")
     for steps in range(1, model.n):
         O = moments.observability_matrix(model.A, C, steps)
-        if np.linalg.matrix_rank(O, tol=1e-9 * np.linalg.norm(O, 2)) == model.n:
+        if np.linalg.matrix_rank(O / _state_sizes(O), tol=1e-9) == model.n:
             return steps
     return model.n
 
 
-def _with_gaps(model: Model, member: Member) -> moments.Noise:
-    """The noise of samples that count 1/q times in a share q of the steps, about one set's filter.
+def _state_sizes(O: Array) -> Array:
+    """[n] size of each state in the outputs, so that the units of states do not matter."""
+    size: Array = np.linalg.norm(O, axis=0)
+    return np.where(size > 0.0, size, 1.0)
 
-    What is averaged over the steps in which a sensor sends tells by how much the innovation C e + v
-    varies from step to step: v is in R / q; the rest is (1/q - 1) C e e' C', as if all samples of a
-    step came together or not at all, as those of a frame do.
-    """
-    lost = np.sqrt(model.weight - 1.0)
-    unsent = np.outer(lost, lost) * (model.C @ member.Pp @ model.C.T)
-    return moments.Noise(model.A, model.C, model.W, model.R + unsent)
+
+def _with_gaps(model: Model, member: Member) -> moments.Noise:
+    """The noise of samples that count 1/q times in a share q of the steps, about one filter."""
+    R = gaps.noise(model.C, member.Pp, model.sample_R, model.weight)
+    return moments.Noise(model.A, model.C, model.W, R)
 
 
 def _tests(model: Model, options: Options, members: list[Member], blocks: list[Block],

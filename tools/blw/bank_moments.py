@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from scipy.linalg import qr, solve_discrete_lyapunov, solve_triangular
 from scipy.special import gammainccinv
 
+from blw.semidefinite import root
+
 NEGLIGIBLE = 1e-6  # of a covariance at lag 0
 MAX_LAGS = 2000
 
@@ -40,12 +42,6 @@ class Noise:
         n, m = len(self.W), len(self.R)
         return np.block([[self.W, np.zeros((n, m))], [np.zeros((m, n)), self.R]])
 
-
-    @property
-    def root(self) -> Array:
-        """[n+m, n+m] with root root' = joint, which may be singular."""
-        values, vectors = np.linalg.eigh(self.joint)
-        return vectors * np.sqrt(np.clip(values, 0.0, None))
 
 
 def power_stack(A: Array, count: int) -> Array:
@@ -81,7 +77,7 @@ def left_inverse(noise: Noise, subset: tuple[int, ...], horizon: int, kind: str)
         return np.linalg.pinv(O)
     response = block_response(noise, subset, horizon)
     # M = L L' from the factor itself: M squares the growth of an unstable A over the block.
-    factor = qr((response @ np.kron(np.eye(horizon), noise.root)).T, mode="r")[0]
+    factor = qr((response @ np.kron(np.eye(horizon), root(noise.joint))).T, mode="r")[0]
     L = factor[:len(O)].T
     basis, triangle = qr(solve_triangular(L, O, lower=True), mode="economic")
     white = solve_triangular(triangle, basis.T)
@@ -132,13 +128,17 @@ class Residue:
     def ewma_variance(self, gain: float) -> float:
         """Variance of the stationary average += gain (q - average).
 
-        Lags up to h are summed, the geometric rest is a Lyapunov equation.
+        Lags up to h are summed, the geometric rest is a Lyapunov equation, in standard deviations
+        of e: its conditioning must not depend on the units of the states.
         """
         h, keep = len(self.N), 1.0 - gain
         Gamma = self.covariances(h)
         c = 2.0 * np.sum(Gamma**2, axis=(1, 2))
-        rest = solve_discrete_lyapunov(np.sqrt(keep) * self.Phi.T, self.T.T @ self.T)
-        start = self._with_error(h)
+        sigma = np.sqrt(np.diag(self.P))
+        units = np.where(sigma > 0.0, sigma, 1.0)
+        Phi, T = self.Phi * units / units[:, None], self.T * units
+        rest = solve_discrete_lyapunov(np.sqrt(keep) * Phi.T, T.T @ T)
+        start = self._with_error(h) / units
         tail = keep**h * 2.0 * np.trace(start @ rest @ start.T)
         total = c[0] + 2.0 * (float(keep ** np.arange(1, h) @ c[1:]) + tail)
         return float(gain / (2.0 - gain) * total)

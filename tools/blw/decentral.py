@@ -13,7 +13,6 @@ from math import comb
 from typing import Any, Literal
 
 import numpy as np
-import scipy.linalg
 
 from blw import chi2, margin
 from blw.decentral_filters import LocalFilters, local_filters, warm_up
@@ -31,10 +30,11 @@ from blw.design import Designed
 from blw.errors import DesignError
 from blw.kalman import Kalman
 from blw.model import Model
+from blw.semidefinite import root
 from blw.tables import Index, Link, Real, Struct, Table, index, table
 
 NAME = "decentral"
-AVERAGES = True
+GAPS = "weighted"
 
 FALSE_ALARM = 1e-3
 FALSE_ALARM_PRINTED = 0.05
@@ -207,7 +207,7 @@ def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node], rese
     upper = [fusion.N[r, r:] for r in range(d)]
     Q = [fusion.Q[i][:fusion.rows(first, i)].T.ravel() for i in range(len(filters.S))]
     H = [np.linalg.inv(R).T[np.tril_indices(len(R))] for R in fusion.R] if reseed else [[]]
-    M = [np.concatenate([node.X.ravel(), node.T[np.tril_indices(len(node.T))]])
+    M = [np.concatenate([np.append(X, T[:r + 1]) for r, (X, T) in enumerate(zip(node.X, node.T))])
          if len(node.sensors) > 1 else np.zeros(0) for node in tree]
     at = np.cumsum([0] + [len(part) for part in M])
     if at[-1] > _INDEX_MAX:
@@ -223,7 +223,7 @@ def _steady_struct(filters: LocalFilters, fusion: Fusion, tree: list[Node], rese
         "Y": table(np.hstack(fusion.Y).T, "[mu x n] stacked Y_i'"),
         "H": table(np.concatenate(H), "R_i^-1 transposed, packed lower, per sensor"),
         "at": index(at, "[n_sets + 1] where the part of a set in M begins"),
-        "M": table(np.concatenate(M), "X, then T packed lower, per set of two or more"),
+        "M": table(np.concatenate(M), "rows of [X T] to the diagonal of T, per set of two or more"),
     })
 
 
@@ -240,17 +240,11 @@ def _recursive_struct(model: Model, filters: LocalFilters, fusion: Fusion,
     return Struct("blw_decentral_recursive_t", f"{NAME}_recursive", {
         "S": table(np.concatenate([S.ravel() for S in filters.S]), "[mu_i x mu_i] per sensor"),
         "t": table(np.concatenate(filters.t), "[mu] y_i = t_i z_i"),
-        "V": table(filters.Phi @ _root(model.W), "[mu x n] V V' = Phi W Phi'"),
+        "V": table(filters.Phi @ root(model.W), "[mu x n] V V' = Phi W Phi'"),
         "E": table(R[np.tril_indices(model.m)], "[m (m + 1) / 2] E E' = R, packed lower"),
-        "L0": table(filters.Phi @ _root(P0), "[mu x n] L0 L0' = Phi P0 Phi'"),
+        "L0": table(filters.Phi @ root(P0), "[mu x n] L0 L0' = Phi P0 Phi'"),
         "Psi": table(fusion.Psi, "[n x mu] steady-state fusion, for the first steps"),
     })
-
-
-def _root(W: np.ndarray) -> np.ndarray:
-    """[n, n] with root root' = W, positive semidefinite."""
-    values, vectors = np.linalg.eigh(W)
-    return vectors * np.sqrt(np.clip(values, 0.0, None))
 
 
 def _footprint(model: Model, filters: LocalFilters, tables: Struct,
@@ -312,7 +306,7 @@ def _info(model: Model, filters: LocalFilters, tree: list[Node], ranking: _Ranki
         dof, thr = ranking.threshold_of(sum(int(filters.mu[i]) for i in node.sensors))
         sets.append({"excluded": [model.sensors[i] for i in node.sensors], "dof": dof,
                      "threshold": thr, "trace_P": node.trace_P})
-    L = scipy.linalg.cholesky(filters.P, lower=True)
+    L = cholesky(filters)
     return {
         "mu": filters.mu.tolist(),
         "false_alarm": ranking.false_alarm,

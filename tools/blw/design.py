@@ -5,6 +5,7 @@ import json
 import platform
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,7 +62,8 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
     Raises DesignError if a method that was named refuses, or if no Kalman filter exists;
     ModelError for wrong options, also those of methods that were not asked for.
     """
-    from blw.kalman import steady_state  # kalman is also a method and imports this module
+    from blw import gaps  # as kalman, a method that imports this module
+    from blw.kalman import steady_state
     from blw.methods import REGISTRY
 
     where = model.path or model.name
@@ -73,7 +75,9 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         kalman = steady_state(model.A, model.C, model.W, model.R)
     except DesignError as error:
         raise DesignError(f"{where}: {error}") from None
-    served = {False: (model, kalman), True: _averaged(model, kalman)}
+    served = {"weighted": cache(partial(gaps.averaged, model)),
+              "counted once": cache(partial(gaps.cautious, model, kalman)),
+              "ignored": lambda: (model, kalman)}
     plant = plant_tables(model, kalman)
     plant.check()
     designed: dict[str, Designed] = {}
@@ -82,7 +86,7 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         progress(name)
         try:
             module = REGISTRY[name]
-            result = module.design(*served[module.AVERAGES], parsed[name])
+            result = module.design(*served[module.GAPS](), parsed[name])
             result.tables.check()
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
@@ -93,16 +97,6 @@ def design_all(model: Model, methods: Sequence[str] | None = None,
         else:
             designed[name] = result
     return Design(model, plant, designed, refused)
-
-
-def _averaged(model: Model, kalman: "Kalman") -> tuple[Model, "Kalman"]:
-    """Model.averaged() and its filter; the same filter where every sensor sends in every step."""
-    from blw.kalman import steady_state
-
-    averaged = model.averaged()
-    if np.all(model.rate == 1.0):
-        return averaged, kalman
-    return averaged, steady_state(averaged.A, averaged.C, averaged.W, averaged.R)
 
 
 def plant_tables(model: Model, kalman: "Kalman") -> Struct:
@@ -148,16 +142,24 @@ def document(design: Design) -> dict[str, Any]:
 
 
 def json_text(document: dict[str, Any]) -> str:
-    """Readable JSON: an object has a line per member, a list is on one line."""
+    """Readable JSON: an object has a line per member, a list is on one line, infinity is null."""
     return _object_text(document, "") + "\n"
 
 
 def _object_text(value: Any, indent: str) -> str:
     if not isinstance(value, dict) or not value:
-        return json.dumps(value, allow_nan=False)
+        return json.dumps(_without_infinity(value), allow_nan=False)
     inner = indent + "  "
     rows = [f"{inner}{json.dumps(key)}: {_object_text(item, inner)}" for key, item in value.items()]
     return "{\n" + ",\n".join(rows) + f"\n{indent}}}"
+
+
+def _without_infinity(value: Any) -> Any:
+    if isinstance(value, list | tuple):
+        return [_without_infinity(item) for item in value]
+    if isinstance(value, dict):
+        return {key: _without_infinity(item) for key, item in value.items()}
+    return None if isinstance(value, float) and np.isinf(value) else value
 
 
 def model_json(model: Model, plant: Struct) -> dict[str, Any]:

@@ -7,11 +7,14 @@ from typing import Any
 import click
 
 from blw import dbc, kalman
+from blw.analysis.observability import sparse_index
 from blw.atomic import write_files
 from blw.design import Design, design_all, document, json_text, small
 from blw.emit_c import files
 from blw.errors import DesignError
-from blw.model import load
+from blw.kalman import mode_text
+from blw.model import Model, load
+from blw.modes import modes_of
 from blw.progress import steps
 
 
@@ -45,12 +48,30 @@ def design(model: Path, out: Path, methods: tuple[str, ...], is_small: bool,
     click.echo(json_text(summary) if as_json else _text(result, written), nl=not as_json)
 
 
+def _warnings(model: Model) -> list[str]:
+    """Why no method can do what is asked of it, if so; `analyze` tells more."""
+    if model.p == 0:
+        return []
+    try:
+        strong = [model.sensors.index(name) for name in model.strong]
+        index = sparse_index(modes_of(model.A, model.C).modes, model.units, strong)
+    except DesignError as error:
+        return [f"whether p = {model.p} is too many is not known: {error}"]
+    if index.upper >= 2 * model.p or index.weakest is None:
+        return []
+    what = "groups" if model.groups else "sensors"
+    return [f"p = {model.p}, but the state follows from the {what} with at most "
+            f"{max(0, index.upper // 2)} of them attacked: too few see the mode "
+            f"{mode_text(index.weakest)}; see bulwark analyze"]
+
+
 def _summary(result: Design, written: list[Path]) -> dict[str, Any]:
     model = result.model
     return {"name": model.name, "model_sha256": model.sha256,
             "n": model.n, "m": model.m, "l": model.l, "p": model.p,
             "methods": {name: designed.info for name, designed in result.methods.items()},
             "refused": result.refused,
+            "warnings": _warnings(model),
             "files": [str(path) for path in written]}
 
 
@@ -63,6 +84,7 @@ def _text(result: Design, written: list[Path]) -> str:
         lines.append(f"  {name:<10} {figures}")
     for name, reason in result.refused.items():
         lines.append(f"  {name:<10} refused: {reason}")
+    lines += [f"warning: {warning}" for warning in _warnings(model)]
     lines += [f"wrote {path}" for path in written]
     return "\n".join(lines)
 

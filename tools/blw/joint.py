@@ -8,22 +8,23 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from blw import joint_analysis as analysis
 from blw import names
 from blw.design import Designed
 from blw.errors import DesignError, ModelError
 from blw.joint_analysis import Step
-from blw.joint_recursion import Pair
+from blw.joint_recursion import Pair, deviations
 from blw.kalman import UNIT_CIRCLE, Kalman, mode_text, unobservable_modes
 from blw.model import Model
+from blw.semidefinite import root
 from blw.tables import Struct, index, table
 
 Array = NDArray[np.float64]
 
 NAME = "joint"
-AVERAGES = False
+GAPS = "ignored"
 
 DEFAULT_ETA = 10.0   # times the variance of the weak sensor's noise
 DECAYED = 1.05       # the initial error has decayed: variance over its limit
@@ -54,13 +55,14 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     pairs, strong = resolve_pairs(model, options)
     P0 = kalman.P if model.P0 is None else model.P0
     printed = options.variant == "printed"
-    eta, figures = choose_eta(model, pairs, P0, options)
-    steps = analysis.transient(model, pairs, P0, eta, printed)
+    heard = [pair.among(strong) for pair in pairs]
+    eta, figures = choose_eta(model, heard, P0, options)
+    steps = analysis.transient(model, heard, P0, eta, printed)
     zero = np.zeros(len(pairs))
-    benign = analysis.performance(model, pairs, steps[-1], zero)
-    scale = 1 / (norm.isf(options.false_alarm / len(pairs) / 2) * np.sqrt(benign.theta))
+    benign = analysis.performance(model, heard, steps[-1], zero)
+    scale = -1 / (ndtri(options.false_alarm / len(pairs) / 2) * np.sqrt(benign.theta))
     recursive = options.gains == "recursive"
-    length, left = schedule_length(steps, options)
+    length, left = schedule_length(model, heard, steps, options)
     members = {
         "r": len(pairs),
         "warm_up": warm_up(steps),
@@ -69,7 +71,9 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "schedule": None if recursive else schedule_struct(model, steps, length),
         "recursive": recursive_struct(model, P0, eta) if recursive else None,
     }
-    info = {**figures, **describe(model, pairs, strong, eta, steps, benign)}
+    info = {**figures, **describe(model, heard, eta, steps, benign)}
+    info["pairs"] = [[model.sensors[pair.weak], [model.sensors[j] for j in pair.strong]]
+                     for pair in pairs]
     info |= {"gains": options.gains, "variant": options.variant, "threshold": (1 / scale).tolist()}
     if not recursive:
         info |= {"schedule_steps": length, "schedule_error": left}
@@ -153,11 +157,13 @@ def choose_eta(model: Model, pairs: list[Pair], P0: Array,
     return eta, {"eta": eta.tolist(), "eta_from": "sweep", "sweep": rows}
 
 
-def schedule_length(steps: list[Step], options: Options) -> tuple[int, float]:
+def schedule_length(model: Model, pairs: list[Pair], steps: list[Step],
+                    options: Options) -> tuple[int, float]:
     """Entries of the schedule, and the largest relative error of gains where it is cut."""
-    limit = steps[-1].flat()
+    unit = deviations(steps[-1].fused)
+    limit = steps[-1].flat(model, pairs, unit)
     size = np.abs(limit).max()
-    errors = [float(np.abs(step.flat() - limit).max() / size) for step in steps]
+    errors = [float(np.abs(step.flat(model, pairs, unit) - limit).max() / size) for step in steps]
     length = 1 + max((k + 1 for k, error in enumerate(errors) if error > options.tolerance),
                      default=0)
     length = min(length, options.max_schedule)
@@ -165,10 +171,10 @@ def schedule_length(steps: list[Step], options: Options) -> tuple[int, float]:
 
 
 def warm_up(steps: list[Step]) -> int:
-    """Steps until the variance has decayed to its limit."""
-    limit = steps[-1].trace
+    """Steps until the variances of all states have come to their limits."""
+    limit = steps[-1].fused
     late = [k for k, step in enumerate(steps, start=1)
-            if max(step.trace / limit, limit / step.trace) > DECAYED]
+            if (np.maximum(step.fused, limit) > DECAYED * np.minimum(step.fused, limit)).any()]
     return min(max(late, default=0), MAX_STEPS)
 
 
@@ -212,24 +218,20 @@ def recursive_struct(model: Model, P0: Array, eta: Array) -> Struct:
 
 def lower_root(S: Array) -> Array:
     """[n, n] lower triangular L with L L' = S, S positive semidefinite."""
-    values, vectors = np.linalg.eigh(S)
-    root = vectors * np.sqrt(np.clip(values, 0.0, None))
-    L = np.linalg.qr(root.T)[1].T
+    L = np.linalg.qr(root(S).T)[1].T
     return np.tril(L * np.where(np.diag(L) < 0, -1.0, 1.0))
 
 
-def describe(model: Model, pairs: list[Pair], strong: list[int], eta: Array, steps: list[Step],
+def describe(model: Model, pairs: list[Pair], eta: Array, steps: list[Step],
              benign: analysis.Performance) -> dict[str, Any]:
-    """What a reader wants to know."""
+    """What a reader wants to know.  pairs: with the partners that are strong at the start."""
     own = analysis.performance(model, pairs, steps[-1], eta)
     unit = [analysis.performance(model, pairs, steps[-1], row) for row in np.eye(len(pairs))]
-    helpers = sorted({sensor for pair in pairs for sensor in pair.strong if sensor in strong})
+    helpers = sorted({sensor for pair in pairs for sensor in pair.strong})
     alone = analysis.strong_filter(model, helpers)
     central = analysis.central_filter(model, pairs, eta)
     listed = [model.sensors[sensor] for sensor in helpers]
     return {
-        "pairs": [[model.sensors[pair.weak], [model.sensors[j] for j in pair.strong]]
-                  for pair in pairs],
         "trace_P_local": own.local.tolist(),
         "trace_P": own.fused,
         "trace_P_no_attack": benign.fused,

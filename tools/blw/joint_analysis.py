@@ -17,6 +17,7 @@ from blw.joint_recursion import (
     Pair,
     Recursion,
     Stack,
+    deviations,
     fused_covariance,
     fusion_weights,
 )
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 MAX_STEPS = 20000
 CONVERGED = 1e-13    # relative change of a step that is taken for rounding
 SETTLED = 1e-10      # the same for covariances under given gains
+VANISHED = 1e-10     # of a variance's size: below, it is one that goes to 0
 PULSE_STEPS = 20     # after a false sample, in which the largest error lies
 EQUAL = 1.02         # variances whose ratio is below are called equal
 CONDITION = 1e9      # growth of a covariance that is taken for divergence
@@ -37,19 +39,28 @@ class Step:
     """Gains, weights G [r n, n], and the variances that go with them.
 
     theta, gap  [r] error variances of theta, and where the weak sensor's sample is missing
-    trace       of the fused covariance
+    fused       [n] error variances of the fused state
     """
 
     gains: Gains
     G: Array
     theta: Array
     gap: Array
-    trace: float
+    fused: Array
 
-    def flat(self) -> Array:
-        """Everything that a schedule holds, as one vector."""
-        parts = [*self.gains.K, *self.gains.Gamma, self.G, np.sqrt(self.theta)]
-        return np.concatenate([part.ravel() for part in parts])
+    def flat(self, model: Model, pairs: Sequence[Pair], unit: Array) -> Array:
+        """Everything that a schedule holds, as one vector without units.
+
+        unit  [n] of the states; the sensors' are the deviations of their noise
+        """
+        noise = deviations(np.diag(model.R))
+        parts = [self.G * np.tile(unit, len(pairs))[:, None] / unit]
+        for pair, K, Gamma, theta in zip(pairs, self.gains.K, self.gains.Gamma, self.theta,
+                                         strict=True):
+            weak = noise[pair.weak]
+            rows = np.vstack([K, Gamma]) / np.append(unit, [weak, weak])[:, None]
+            parts += [rows * noise[list(pair.sensors)], np.sqrt(theta) / weak]
+        return np.concatenate([np.ravel(part) for part in parts])
 
 
 def transient(model: Model, pairs: Sequence[Pair], P0: Array, eta: Array,
@@ -57,25 +68,38 @@ def transient(model: Model, pairs: Sequence[Pair], P0: Array, eta: Array,
     """Steps k = 1, 2, ... until nothing changes any more.  Raises DesignError."""
     stack = Stack(model, pairs, shared_noise=not printed)
     recursion = Recursion(stack, P0, eta, printed)
-    start = np.trace(recursion.PX) + np.trace(model.W)
+    size = sizes(model, pairs, P0, eta)
     steps: list[Step] = []
-    last, change = np.zeros(0), np.inf
     for _ in range(MAX_STEPS):
+        PX, V = recursion.PX, recursion.V
         gains = recursion.advance()
-        if not np.trace(recursion.PX) <= CONDITION * start:
+        if not (np.diag(recursion.PX) <= CONDITION * size).all():
             raise DesignError("the covariances of the local estimators grow without bound"
                               + (": the printed recursion is not stable here" if printed else ""))
         G = fusion_weights(recursion.Sigma, model.n)
         steps.append(Step(gains, G, recursion.theta_variance.copy(), recursion.gap_variance(gains),
-                          float(np.trace(fused_covariance(recursion.Sigma, G)))))
-        now = np.concatenate([recursion.PX.ravel(), recursion.V.ravel()])
-        if last.size:
-            change = np.abs(now - last).max() / np.abs(now).max()
-        last = now
+                          np.diag(fused_covariance(recursion.Sigma, G))))
+        change = max(relative_change(recursion.PX, PX, size),
+                     relative_change(recursion.V, V, size[stack.attack_rows]))
         if change <= CONVERGED:
             return steps
     raise DesignError(f"the gains have not settled after {MAX_STEPS} steps: they still change by "
                       f"{change:.1e} per step")
+
+
+def sizes(model: Model, pairs: Sequence[Pair], P0: Array, eta: Array) -> Array:
+    """[r (n + 1)] variances to measure those of the local estimators by, each in its own unit."""
+    best = kalman.steady_state(model.A, model.C, model.W, model.R).P
+    state = np.diag(best) + np.diag(P0)
+    return np.concatenate([np.append(state, eta[i] + model.R[pair.weak, pair.weak])
+                           for i, pair in enumerate(pairs)])
+
+
+def relative_change(now: Array, last: Array, size: Array) -> float:
+    """Between two covariances, every entry in units of the deviations that it belongs to; what has
+    all but vanished from its size counts as nothing."""
+    unit = deviations(np.maximum(np.abs(np.diag(now)), VANISHED * size))
+    return float((np.abs(now - last) / np.outer(unit, unit)).max())
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,13 +113,16 @@ class Performance:
 
 def performance(model: Model, pairs: Sequence[Pair], step: Step, variance: Array) -> Performance:
     """Errors of fixed gains when theta is white with these variances [r]; 0 is no attack."""
-    recursion = Recursion(Stack(model, pairs), np.zeros((model.n, model.n)), variance)
-    last = np.zeros_like(recursion.PX)
+    P0 = np.zeros((model.n, model.n))
+    recursion = Recursion(Stack(model, pairs), P0, variance)
+    size = sizes(model, pairs, P0, variance)
     for _ in range(MAX_STEPS):
+        PX = recursion.PX
         recursion.advance(step.gains)
-        if np.abs(recursion.PX - last).max() <= SETTLED * np.abs(recursion.PX).max():
+        if not (np.diag(recursion.PX) <= CONDITION * size).all():
+            raise DesignError("the local estimators are not stable under their gains")
+        if relative_change(recursion.PX, PX, size) <= SETTLED:
             break
-        last = recursion.PX
     local = np.diag(recursion.Sigma).reshape(len(pairs), model.n).sum(axis=1)
     fused = float(np.trace(fused_covariance(recursion.Sigma, step.G)))
     return Performance(local, fused, recursion.theta_variance.copy())
@@ -159,6 +186,8 @@ def decades(model: Model, pairs: Sequence[Pair], size: float) -> list[float]:
 def strong_filter(model: Model, strong: Sequence[int]) -> float | None:
     """tr P of a Kalman filter on these sensors alone; None if they do not see every mode."""
     rows = list(strong)
+    if not rows:
+        return None
     try:
         found = kalman.steady_state(model.A, model.C[rows], model.W, model.R[np.ix_(rows, rows)])
     except DesignError:
@@ -182,13 +211,18 @@ def central_filter(model: Model, pairs: Sequence[Pair], eta: Array,
     K = kalman.steady_state(model.A, model.C[rows], model.W, noise(eta)).K
     R = noise(eta if actual is None else actual)
     keep = np.eye(model.n) - K @ model.C[rows]
-    P = solve_discrete_lyapunov(keep @ model.A, keep @ model.W @ keep.T + K @ R @ K.T)
-    return float(np.trace(P))
+    added = keep @ model.W @ keep.T + K @ R @ K.T
+    unit = deviations(np.diag(added))
+    P = solve_discrete_lyapunov(keep @ model.A * unit / unit[:, None],
+                                added / np.outer(unit, unit))
+    return float(np.diag(P) @ unit**2)
 
 
 def verdict(names: Sequence[str], fused: float, strong: float | None, central: float) -> str:
     """What a reader should know before choosing the method, in a sentence or two."""
     listed = ", ".join(names)
+    if not names:
+        return "no partner is strong at the start: until one is, no attack can be told from motion"
     if strong is None:
         return (f"the strong sensors alone ({listed}) do not see every mode, so no Kalman filter "
                 "can run on them; an attack that imitates an unseen mode stays unseen")

@@ -41,6 +41,10 @@ class Pair:
         """The weak sensor first, as in (3)."""
         return (self.weak, *self.strong)
 
+    def among(self, trusted: Sequence[int]) -> "Pair":
+        """The same with those partners only that are trusted."""
+        return Pair(self.weak, tuple(sensor for sensor in self.strong if sensor in trusted))
+
 
 @dataclass(frozen=True, eq=False)
 class Gains:
@@ -182,11 +186,15 @@ def fusion_weights(Sigma: Array, n: int) -> Array:
     """G [r n, n] of (12), G' [x_1; ...; x_r] = x_hat, with sum G_i = I whatever Sigma.
 
     G = H / r + N M with H' N = 0; M minimises the fused covariance by a pseudo-inverse, so a
-    singular Sigma (estimators that share all their sensors) yields finite weights.
+    singular Sigma (estimators that share all their sensors) yields finite weights.  What it cuts
+    off is judged in units of the states' own deviations, whatever the units of the model.
     """
     r = len(Sigma) // n
     if r == 1:
         return np.eye(n)
+    unit = deviations(np.abs(np.diag(Sigma)).reshape(r, n).max(axis=0))
+    units = np.tile(unit, r)
+    Sigma = Sigma / np.outer(units, units)
     H = np.kron(np.ones((r, 1)), np.eye(n))
     N = np.kron(null_space(np.ones((1, r))), np.eye(n))
     D = N.T @ Sigma @ N
@@ -194,7 +202,13 @@ def fusion_weights(Sigma: Array, n: int) -> Array:
     keep = np.abs(values) > CUT_OFF * np.abs(np.diag(Sigma)).max()
     kept = vectors[:, keep]
     M = -kept @ ((kept.T @ (N.T @ Sigma @ H)) / values[keep, None]) / r
-    return H / r + N @ M
+    return (H / r + N @ M) * unit / units[:, None]
+
+
+def deviations(variances: Array) -> Array:
+    """Standard deviations to a power of two: to scale by them is exact; 1 for the variance 0."""
+    positive = np.where(variances > 0, variances, 1.0)
+    return np.exp2(np.round(np.log2(positive) / 2))
 
 
 def fused_covariance(Sigma: Array, G: Array) -> Array:

@@ -23,12 +23,13 @@ from blw.model import Model
 from blw.tables import Struct, table
 
 NAME = "kalman"
-AVERAGES = True
+GAPS = "weighted"
 
 UNIT_CIRCLE = 1e-8     # an eigenvalue this close to it counts as on it
 CLUSTER = 1e-4         # eigenvalues of a defective matrix scatter; their mean does not
 PBH = 1e-10            # relative singular value below which a mode is unseen
 POLISH_STEPS = 20      # Riccati steps at most
+DOUBLINGS = 60         # of the Riccati recursion at most
 SEMIDEFINITE = 1e-9    # negative eigenvalue of a correlation matrix that is taken for rounding
 ROUNDING = 1e-14       # relative eigenvalue of a correlation matrix that is taken for rounding
 CONDITION_MAX = 1e14   # of the correlation matrix of R
@@ -63,11 +64,42 @@ def steady_state(A: Array, C: Array, W: Array, R: Array) -> Kalman:
     _check_modes(A, C, "no sensor sees the mode", "it is not detectable")
     _check_modes(A.T, _root(W), "no noise reaches the mode",
                  "it is not stabilisable; give B Q B' a part in it")
+    return _checked(_polish(A, C, W, R, _stabilising(A, C, W, R)))
+
+
+def _stabilising(A: Array, C: Array, W: Array, R: Array) -> Array:
+    """Pp [n, n], to be polished."""
     try:
         Pp = solve_discrete_are(A.T, C.T, W, R)
-    except (np.linalg.LinAlgError, ValueError) as error:
-        raise DesignError(f"the Riccati equation has no stabilising solution ({error})") from None
-    return _checked(_polish(A, C, W, R, (Pp + Pp.T) / 2))
+    except (np.linalg.LinAlgError, ValueError):  # its Schur form could not be put in order
+        Pp = _doubled(A, C, W, R)
+    if not np.isfinite(Pp).all():
+        raise DesignError("the Riccati equation has no stabilising solution")
+    return _covariance(Pp)
+
+
+def _covariance(P: Array) -> Array:
+    """P [n, n] made symmetric; 0 for a state whose variance is nothing but negative rounding."""
+    P = (P + P.T) / 2
+    known = np.diag(P) < 0.0
+    P[known] = P[:, known] = 0.0
+    return P
+
+
+def _doubled(A: Array, C: Array, W: Array, R: Array) -> Array:
+    """Pp [n, n] by doubling: Pp(1), Pp(2), Pp(4), ... of the Riccati recursion from 0 (Anderson and
+    Moore, Optimal Filtering, 6.7)."""
+    step, G, Pp = A.T, C.T @ cho_solve(cho_factor(R), C), W
+    for _ in range(DOUBLINGS):
+        V = np.linalg.solve(np.eye(len(A)) + G @ Pp, np.hstack([step, G]))
+        forward, spread = V[:, :len(A)], V[:, len(A):]
+        change = step.T @ Pp @ forward
+        G = G + step @ spread @ step.T
+        Pp = Pp + change
+        step = step @ forward
+        if not np.abs(change).max() > np.finfo(float).eps * np.abs(Pp).max():
+            break
+    return Pp
 
 
 def modes(A: Array) -> list[complex]:
@@ -118,6 +150,7 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
     S = model.C @ kalman.Pp @ model.C.T + model.sample_R
     info = {
         "trace_P": float(np.trace(kalman.P)),
+        "P": kalman.P.tolist(),
         "sigma": np.sqrt(np.diag(kalman.P)).tolist(),
         "innovation_sigma": np.sqrt(np.diag(S)).tolist(),
         "spectral_radius": float(np.abs(np.linalg.eigvals(kalman.Acl)).max()),
@@ -164,7 +197,7 @@ def _riccati(A: Array, C: Array, W: Array, R: Array, Pp: Array) -> Kalman:
     K = cho_solve(cho_factor(S), C @ Pp).T
     keep = np.eye(len(A)) - K @ C
     P = keep @ Pp @ keep.T + K @ R @ K.T
-    return Kalman(K=K, P=(P + P.T) / 2, Pp=Pp, Acl=keep @ A)
+    return Kalman(K=K, P=_covariance(P), Pp=Pp, Acl=keep @ A)
 
 
 def _polish(A: Array, C: Array, W: Array, R: Array, Pp: Array) -> Kalman:
@@ -172,8 +205,7 @@ def _polish(A: Array, C: Array, W: Array, R: Array, Pp: Array) -> Kalman:
     filtered = _riccati(A, C, W, R, Pp)
     change = np.inf
     for _ in range(POLISH_STEPS):
-        Pp_next = A @ filtered.P @ A.T + W
-        Pp_next = (Pp_next + Pp_next.T) / 2
+        Pp_next = _covariance(A @ filtered.P @ A.T + W)
         last, change = change, np.abs(Pp_next - filtered.Pp).max()
         if not change < last:
             break

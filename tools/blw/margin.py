@@ -15,7 +15,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import ncx2
 
 from blw import chi2
 from blw.model import Model
@@ -48,4 +47,6 @@ def chi2_threshold(false_alarm: float, dof: float, delta: float) -> float:
     """What |z + d|^2 exceeds with the probability false_alarm, z ~ N(0, I) and |d| = delta."""
     if delta == 0.0:
         return chi2.threshold(false_alarm, dof)
+    from scipy.stats import ncx2  # here, since loading it takes longer than most commands
+
     return float(ncx2.isf(false_alarm, dof, delta**2))
