@@ -55,7 +55,7 @@ def test_recorded_car_with_lossy_frames_is_estimated_nearly_as_by_the_oracle(bul
         assert told["median_to_oracle"] < 2.0
         assert told["worst"] < 0.040  # of the brute-force bank in the data's description
         assert told["stuck"] == [] and told["detected"] >= 2
-    assert case["methods"]["kalman"]["worst"] > 0.5
+    assert case["methods"]["kalman"]["worst"] > 0.4
 
 
 def test_recorded_car_given_a_masqueraded_frame_meets_the_design_by_groups(bulwark, data,

@@ -9,7 +9,7 @@ import hashlib
 import json
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 class Model:
     """A checked, discrete-time model.  Sizes: n states, m sensors, l inputs, s noise sources.
 
-    sample_R is the covariance of single samples: R, except in what averaged() returns.
+    sample_R is the covariance of single samples: R, except where R is that of gaps.py.
     """
 
     name: str
@@ -84,14 +84,6 @@ class Model:
     def silence(self) -> int:
         """Steps in which EXPECTED samples of the sensor that sends least should have come."""
         return int(np.ceil(EXPECTED / self.rate.min()))
-
-    def averaged(self) -> "Model":
-        """The same plant with sensors that send in every step and tell as much in the long run.
-
-        A sample in a share q of the steps that counts 1/q times has the mean of one in every
-        step, and the noise R / q (docs/recorded.md).
-        """
-        return replace(self, R=self.R * np.sqrt(np.outer(self.weight, self.weight)))
 
     @property
     def units(self) -> list[list[int]]:
