@@ -8,17 +8,16 @@ from pathlib import Path
 
 import lcm
 import pytest
-from conftest import Prepared, Recorded, call, on
+from conftest import BRIEF, Prepared, Recorded, call, on
 
 from blw.build import bus
 from blw.logs import lcm_types
 
-STEPS = 400
 SENSORS = 4
 
 
-def assert_benign_bits(written: Path, prepared: Prepared) -> None:
-    assert written.read_bytes() == (prepared.inproc / "benign" / "guard.csv").read_bytes()
+def assert_brief_bits(written: Path, prepared: Prepared) -> None:
+    assert written.read_bytes() == (prepared.inproc / "brief" / "guard.csv").read_bytes()
 
 
 @on("lcm", "can")
@@ -28,7 +27,7 @@ def test_node_that_hears_the_stock_player_yields_the_bits_of_the_run(
     told = recorded.case("stock")
     assert told["stock"]["status"] == [0, 0]
     assert told[log]["status"] == [0]
-    assert_benign_bits(recorded.out / log / "guard.csv", prepared)
+    assert_brief_bits(recorded.out / log / "guard.csv", prepared)
 
 
 @on("lcm", "can")
@@ -39,7 +38,7 @@ def test_replay_of_the_stock_recorder_s_log_yields_the_bits_of_the_run(
                  "lcm" if recorded.transport == "lcm" else "candump", "--design", prepared.design,
                  "--method", "guard", "--out", tmp_path])
     assert done.returncode == 0, done.stderr
-    assert_benign_bits(tmp_path / "guard.csv", prepared)
+    assert_brief_bits(tmp_path / "guard.csv", prepared)
 
 
 @on("can")
@@ -48,7 +47,7 @@ def test_node_on_the_replay_link_given_candump_s_log_yields_the_bits_of_the_run(
     done = call([bus("f32"), "node", "--design", prepared.design, "--method", "kalman,guard",
                  "--link", f"replay:{recorded.out / 'recorded.can'}", "--out", tmp_path])
     assert done.returncode == 0, done.stderr
-    assert_benign_bits(tmp_path / "guard.csv", prepared)
+    assert_brief_bits(tmp_path / "guard.csv", prepared)
 
 
 @on("can")
@@ -62,8 +61,8 @@ def test_cantools_decodes_candump_s_log_by_the_generated_dbc(recorded: Recorded,
     counts = {name: len(re.findall(rf":: {name}\(", done.stdout))
               for name in ("sync", "y_cart1", "y_angle", "u_force_N", "x_0", "x_1", "status",
                            "sensors_0")}
-    assert counts.pop("sync") == STEPS + 3  # the end is said three times
-    assert set(counts.values()) == {STEPS}, counts
+    assert counts.pop("sync") == BRIEF + 3  # the end is said three times
+    assert set(counts.values()) == {BRIEF}, counts
     assert "Unknown frame id" not in done.stdout
 
 
@@ -78,6 +77,6 @@ def test_python_lcm_reads_the_logger_s_log(recorded: Recorded) -> None:
     for channel in read:
         said = [message.seq for name, message in events if name == channel]
         first = 0 if channel == "BLW_INPUT" else 1  # an input counts from the step it acts in
-        assert said == list(range(first, STEPS + first)), channel
+        assert said == list(range(first, BRIEF + first)), channel
     assert all(message.m == SENSORS and all(message.valid) for name, message in events
                if name == "BLW_MEASUREMENT")

@@ -10,6 +10,7 @@ import pytest
 from shared_data import SHARED
 
 from blw import cli, importer, model
+from blw.report.csv_file import CsvFile
 
 DATA = SHARED / "data"
 RECORDED = ["rav4_verifiedcan/model.json", "rav4_comma2k19/model.json", "css_obd_gnss/model.json",
@@ -52,6 +53,12 @@ def test_import_given_model_writes_an_equal_model_file(source, tmp_path, capsys)
     np.testing.assert_array_equal(found.R, np.diag(RAW["R"]))
     np.testing.assert_array_equal(found.offset, RAW["offset"])
     np.testing.assert_array_equal(found.P0, np.eye(2))
+
+
+def test_import_given_model_chooses_coordinates_that_bear_lost_samples(source, tmp_path):
+    out = tmp_path / "car.toml"
+    assert cli.main(["import", str(source), "--out", str(out)]) == 0
+    assert tomllib.loads(out.read_text())["method"]["canonical"]["coordinates"] == "steady"
 
 
 def test_import_given_options_overrides_name_p_and_groups(source, tmp_path):
@@ -157,3 +164,10 @@ def test_import_given_recorded_model_is_accepted(name, tmp_path):
     found = model.load(out)
     np.testing.assert_array_equal(found.C, raw["C"])
     assert found.p == raw["p_max_groups"]
+
+
+def test_log_given_a_byte_order_mark_and_spaces_reads_as_replay_does(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_bytes(b'\xef\xbb\xbfw_fl, ax, "w_fr"\r\n1.5, , 3\r\n')
+    values = CsvFile.read(log).numbers(RAW["sensors"])
+    np.testing.assert_array_equal(values, [[1.5, np.nan, 3.0]])

@@ -90,7 +90,9 @@ def test_foreign_log_takes_only_valid_samples_of_the_right_channel(foreign):
 @pytest.mark.parametrize("line, message", [
     ("(1.0) can0 00A#12", "car.log:2: Speed: "),
     ("(1.0) can0", "car.log:2: not a line of candump -L"),
-    ("(1.0) can0 00A#1", "car.log:2: Speed: "),
+    ("(1.0) can0 00A#1", "car.log:2: not a line of candump -L"),
+    ("(1.0) can0 00A#E8031", "car.log:2: not a line of candump -L"),
+    ("(1.0) can0 00A##0E803010", "car.log:2: not a line of candump -L"),
     ("(1.0) can0 00A#xy", "car.log:2: not a line of candump -L"),
     ("1.0,can0,00A,12", "car.log:2: not a line of candump -L"),
     ("(nan) can0 00A#00", "car.log:2: the time is nan"),
@@ -99,6 +101,19 @@ def test_foreign_log_takes_only_valid_samples_of_the_right_channel(foreign):
 def test_foreign_log_given_a_bad_line_names_it(foreign, line, message):
     with pytest.raises(BulwarkError, match="^.*" + message.replace("+", r"\+")):
         foreign(f"(0.9) can0 00A#{speed(1)}\n{line}\n")
+
+
+def test_foreign_log_given_an_extended_identifier_takes_it_for_another_message(foreign):
+    steps = foreign(f"(1.0) can0 00A#{speed(10)}\n(1.1) can0 0000000A#{speed(20)}\n"
+                    f"(1.2) can0 00A##1{speed(30)}\n")
+    np.testing.assert_allclose(steps.signals[1:, 0], [6, 16])
+
+
+@pytest.mark.parametrize("flags", [0x20000000, 0x20000080])
+def test_foreign_log_given_error_and_remote_frames_leaves_them_out(foreign, flags):
+    steps = foreign(f"(1.0) can0 00A#{speed(10)}\n(1.1) can0 {flags + 10:08X}#0004000000000000\n"
+                    f"(1.1) can0 00A#R\n(1.1) can0 00A#R3\n(1.2) can0 00A#{speed(30)} R\n")
+    np.testing.assert_allclose(steps.signals[1:, 0], [6, 16])
 
 
 def test_foreign_log_without_known_frames_refuses(foreign):
@@ -150,6 +165,13 @@ def test_own_frames_given_damage_count_what_is_left_out(own):
                 (wire.ID_MEASUREMENT + 7, wire.put_value(wire.ID_MEASUREMENT, 7, 4, 1.0)))
     np.testing.assert_array_equal(steps.signals[:, 0], [np.nan, 1, np.nan, np.nan, 2])
     assert sorted(steps.dropped.values()) == [1, 1, 1]
+
+
+def test_own_frames_given_extended_identifiers_are_somebody_elses(own):
+    identifier, data = y(1, 9.0)
+    steps = own(y(1, 1.0), (0x80000000 + identifier, data))
+    np.testing.assert_array_equal(steps.signals[1, 0], 1)
+    assert not steps.dropped
 
 
 def test_own_frames_of_can_fd_hold_several_values(own):

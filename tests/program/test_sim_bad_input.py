@@ -12,6 +12,7 @@ ROWS = "0,0,,,,0\n1,0.1,1,1,1,0\n2,0.2,1,1,1,0\n"
 LOGS = {
     "empty": ("", "in.csv: is empty"),
     "blank": ("\n \n", "in.csv: is empty"),
+    "utf-16": ("k\0,\0t\0\n\0", "in.csv: is no text in ASCII or UTF-8"),
     "header only": (HEADER, "in.csv: has no measurement"),
     "one row": (HEADER + "0,0,,,,0\n", "in.csv: has no measurement"),
     "unknown column": ("k,t_s,a,b,c,force_N,zeta\n", 'in.csv:1:21: zeta: unknown column'),

@@ -15,6 +15,9 @@ from blw.errors import BulwarkError
 from blw.logs.signal_map import Source
 from blw.logs.steps import MOST_STEPS, Names, Steps, on_grid
 
+#: In an identifier: the frame tells of an error on the bus (linux/can.h).
+ERROR_FLAG = 0x20000000
+
 
 def frames(path: Path) -> Iterator[tuple[int, can.Message]]:
     """Line number and frame of every data frame.  Raises BulwarkError for a line that is none."""
@@ -24,6 +27,7 @@ def frames(path: Path) -> Iterator[tuple[int, can.Message]]:
         while True:
             try:
                 frame = next(reader, None)
+                data_frame = frame is not None and _is_data_frame(frame, lines.text)
             except (ValueError, IndexError):
                 raise BulwarkError(f"{path}:{lines.number}: not a line of candump -L: "
                                    f"{lines.text.strip()[:60]!r}") from None
@@ -31,8 +35,22 @@ def frames(path: Path) -> Iterator[tuple[int, can.Message]]:
                 return
             if not math.isfinite(frame.timestamp):
                 raise BulwarkError(f"{path}:{lines.number}: the time is {frame.timestamp}")
-            if not (frame.is_error_frame or frame.is_remote_frame):
+            if data_frame:
                 yield lines.number, frame
+
+
+def _is_data_frame(frame: can.Message, line: str) -> bool:
+    """python-can knows some of the error frames only, and takes half a byte for a whole one.
+
+    Raises ValueError for the latter: it is where a log was cut off.
+    """
+    identifier, _, data = line.split()[2].partition("#")
+    if frame.is_remote_frame or int(identifier, 16) & ERROR_FLAG:
+        return False
+    flags = 1 if frame.is_fd else 0
+    if (len(data.lstrip("#")) - flags) % 2 != 0:
+        raise ValueError("half a byte")
+    return True
 
 
 class _Counted:
@@ -58,14 +76,16 @@ class _Counted:
 
 def read_foreign(path: Path, sources: Sequence[Source], names: Names) -> Steps:
     """A log of somebody else's frames.  Raises BulwarkError."""
-    by_id: dict[int, list[Source]] = {}
+    by_id: dict[tuple[int, bool], list[Source]] = {}
     for source in sources:
-        by_id.setdefault(source.message.frame_id, []).append(source)
+        message = source.message
+        by_id.setdefault((message.frame_id, message.is_extended_frame), []).append(source)
     found: list[tuple[float, int, float]] = []
     start = math.inf
     for line, frame in frames(path):
         start = min(start, frame.timestamp)
-        wanted = [source for source in by_id.get(frame.arbitration_id, ())
+        identifier = (frame.arbitration_id, frame.is_extended_id)
+        wanted = [source for source in by_id.get(identifier, ())
                   if source.entry.channel in (None, frame.channel)]
         if wanted:
             found += _values(f"{path}:{line}", frame, wanted)
@@ -99,6 +119,8 @@ def read_own(path: Path, names: Names) -> Steps:
     """
     found = _OwnFrames(names)
     for line, frame in frames(path):
+        if frame.is_extended_id:
+            continue
         try:
             found.take(frame.arbitration_id, bytes(frame.data))
         except wire.FrameError:

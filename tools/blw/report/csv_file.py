@@ -26,8 +26,8 @@ class CsvFile:
     @classmethod
     def read(cls, path: Path) -> CsvFile:
         try:
-            with path.open(newline="", encoding="utf-8") as file:
-                lines = list(csv.reader(file))
+            with path.open(newline="", encoding="utf-8-sig") as file:
+                lines = list(csv.reader(file, skipinitialspace=True))
         except FileNotFoundError as error:
             raise BulwarkError(
                 f"{path}: no such file; `run` and `replay` write it into their --out folder"
