@@ -49,6 +49,10 @@ def test_sum_given_a_branch_that_is_taken_refills_the_pipeline():
     assert _sum([Counter({(0, 2): 1, (2, 8): 1})], code).total.cycles == 1 + 3
 
 
-def test_sum_given_a_pair_twice_counts_it_twice():
-    once = run(("vldr", "s0, [r0]"), ("vadd.f32", "s1, s1, s0"))
-    assert (once.instructions, once.cycles) == (2, 3)
+def test_sum_given_two_steps_counts_both_and_the_calls_in_them():
+    code = {0: instruction("vldr", "s0, [r0]", function="f"),
+            4: instruction("vadd.f32", "s1, s1, s0", function="g"),
+            8: instruction("movs", "r0, r0", function="replay")}
+    trace = _sum([Counter({(0, 4): 1, (4, 8): 1})] * 2, code)
+    assert (trace.steps, trace.total.instructions, trace.total.cycles) == (2, 4, 6)
+    assert [trace.functions[name].entries for name in "fg"] == [0, 2]

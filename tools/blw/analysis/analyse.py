@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from blw.analysis import advice, security
-from blw.analysis.footprint import footprint
+from blw.analysis.footprint import footprint, with_simulation
 from blw.analysis.observability import Index, sparse_index
 from blw.analysis.tuning import tuning
 from blw.design import design_all
@@ -82,8 +82,9 @@ def _designs(model: Model, methods: Sequence[str], progress: Progress) -> dict[s
             found[name] = {"refused": reason}
             continue
         designed = whole.methods[name]
-        found[name] = {"tuning": tuning(designed.info),
-                       "footprint": asdict(footprint(name, designed, whole.plant))}
+        progress(f"{name}: instructions")
+        cost = with_simulation(footprint(name, designed, whole.plant), name, whole)
+        found[name] = {"tuning": tuning(designed.info), "footprint": asdict(cost)}
     return found
 
 

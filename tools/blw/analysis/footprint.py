@@ -7,15 +7,15 @@ the state structure and its memory.  Stack is measured, not computed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import comb
 from typing import Any
 
 import numpy as np
 
-from blw.analysis import instructions
+from blw.analysis import instructions, l1_instructions
 from blw.analysis.headers import macro, size_of
-from blw.design import Designed
+from blw.design import Design, Designed
 from blw.tables import Index, Struct, Table
 
 REAL = 4
@@ -27,14 +27,15 @@ MODULE = {"canonical": "lasso"}
 
 @dataclass(frozen=True)
 class Footprint:
-    """Bytes; multiply-adds per step without alarm and at most, and instructions on a Cortex-M4F
-    without alarm (None: not modelled)."""
+    """Bytes; multiply-adds per step without alarm and at most; instructions on a Cortex-M4F without
+    alarm, and the mean while one sensor after another is attacked (None: not modelled)."""
 
     flash_bytes: int
     ram_bytes: int
     macs_typical: int | None
     macs_worst: int | None
     instructions_typical: int | None
+    instructions_mean_attacked: int | None = None
 
 
 def footprint(name: str, designed: Designed, plant: Struct) -> Footprint:
@@ -50,6 +51,14 @@ def footprint(name: str, designed: Designed, plant: Struct) -> Footprint:
         macs_worst=worst,
         instructions_typical=instructions.typical(name, designed, tables),
     )
+
+
+def with_simulation(cost: Footprint, name: str, design: Design) -> Footprint:
+    """The same with the instructions of a method whose work depends on the data."""
+    found = l1_instructions.expected(design, name) if name in l1_instructions.METHODS else None
+    if found is None:
+        return cost
+    return replace(cost, instructions_typical=found[0], instructions_mean_attacked=found[1])
 
 
 def table_bytes(struct: Struct) -> int:

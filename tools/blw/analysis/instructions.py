@@ -3,9 +3,8 @@
 
 What a step does is counted in the tables: multiply-adds of the loops, operations of the
 straight-line code, sensors and sets that are looked at.  What each of these takes is measured, and
-the tests hold the formulas to 10 % of every row of docs/cost.md.  `lasso` and `canonical` have
-none: they pivot 1.04 to 1.31 times as often as the solution has groups, and what a pivot takes
-varies by more than that, so that only a run of the engine tells.
+the tests hold the formulas to 10 % of every row of docs/cost.md.  What `lasso` and `canonical` do
+depends on the data: l1_instructions.py.
 """
 
 import re
@@ -22,15 +21,15 @@ KALMAN_AROUND = 48
 KALMAN_LOOP = 10.6
 
 #: decentral: around all, a sensor or row of a product, a multiply-add.
-DECENTRAL_AROUND = 1510
-DECENTRAL_ROW = 61
-DECENTRAL_LOOP = 6.0
+DECENTRAL_AROUND = 1650
+DECENTRAL_ROW = 33
+DECENTRAL_LOOP = 5.9
 
 #: bank: around all, a multiply-add, a sample of a block of a subset, a test of a set.
-BANK_AROUND = 4310
-BANK_LOOP = 7.57
-BANK_SAMPLE = 16.7
-BANK_TEST = 228
+BANK_AROUND = 3720
+BANK_LOOP = 7.35
+BANK_SAMPLE = 16.8
+BANK_TEST = 233
 
 #: joint: around all, a sensor of the plant or of a local estimator, a local estimator, a
 #: multiply-add; with the recursion, where the rest no longer counts: see _joint().

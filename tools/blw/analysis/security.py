@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from blw import canonical, l1, options
+from blw import canonical, gaps, l1, options
 from blw.analysis.l1_ratio import UNBOUNDED, ZERO, Ratio, RatioProblem
 from blw.analysis.observability import Index, sparse_index
 from blw.kalman import Kalman, mode_text
@@ -87,7 +87,7 @@ def _kalman(case: Case) -> Verdict:
 def _lasso(case: Case) -> Verdict:
     if case.p == 0:
         return Verdict(True, "no sensor is attacked (p = 0)", [ZERO] * case.model.m)
-    filters = local_filters(case.model, case.kalman)
+    filters = local_filters(*gaps.cautious(case.model, case.kalman))
     m, r = case.model.m, filters.r
     groups = l1.sensor_groups(filters.form.groups(), m, r)
     rows = [weight * filters.G[first:last]

@@ -4,6 +4,7 @@
 import textwrap
 from typing import Any
 
+from blw.analysis.l1_work import BIAS
 from blw.analysis.tuning import tuning_text
 
 WIDTH = 96
@@ -76,18 +77,22 @@ def _ratios(sensors: list[str], entry: dict[str, Any]) -> list[str]:
 
 def _costs(result: dict[str, Any]) -> list[str]:
     lines = [f"{'Footprint':<11} {'flash B':>9} {'RAM B':>8}   multiply-adds: usual, at most"
-             "   Cortex-M4F instructions: usual"]
+             "   M4F instructions: usual, attacked"]
     for name, entry in result["methods"].items():
         if "footprint" in entry:
             cost = entry["footprint"]
             work = [f"{value:>{width},}" if value is not None else f"{'-':>{width}}"
                     for value, width in ((cost["macs_typical"], 10), (cost["macs_worst"], 14),
-                                         (cost["instructions_typical"], 31))]
+                                         (cost["instructions_typical"], 21),
+                                         (cost["instructions_mean_attacked"], 12))]
             lines.append(f"{name:<11} {cost['flash_bytes']:>9,} {cost['ram_bytes']:>8,}   "
                          + "".join(work))
         elif "refused" in entry:
             lines.append(f"{name:<11} refused, see above" if "secure" in entry
                          else f"{name:<11} refused: {entry['refused']}")
+    if any(entry.get("footprint", {}).get("instructions_mean_attacked")
+           for entry in result["methods"].values()):
+        lines.append(f"Attacked: mean, {BIAS:.0f} standard deviations on one sensor after another")
     return lines
 
 

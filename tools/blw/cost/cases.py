@@ -27,6 +27,10 @@ from blw.options import suggestion
 #: and all the others are attacked.  A method that warms up for longer settles for a multiple.
 SETTLING_STEPS = 50
 BENIGN_STEPS = 50
+ATTACKED_STEPS = 200
+
+#: What settled local filters still have of where they began.
+FORGOTTEN = 0.01
 
 #: Folder in that of a case: the same without straight-line code.
 SMALL = "small"
@@ -126,9 +130,14 @@ def owner(design: Design, method: str) -> str:
 
 
 def settling_steps(design: Design, method: str) -> int:
-    """Before the first step that costs what every later one does."""
-    warm_up = design.methods[method].tables.members.get("warm_up", 0)
-    return SETTLING_STEPS * max(1, -(-warm_up // SETTLING_STEPS))
+    """Before the first step that costs what every later one does: a warm-up, and where the work
+    depends on the data, local filters that have forgotten that they began without error."""
+    designed = design.methods[method]
+    warm_up = designed.tables.members.get("warm_up", 0)
+    slowest = max((abs(complex(pole["re"], pole["im"]))
+                   for pole in designed.info.get("eigenvalues", [])), default=0.0)
+    forgotten = int(np.log(FORGOTTEN) / np.log(slowest)) if slowest > 0.0 else 0
+    return SETTLING_STEPS * max(1, -(-max(warm_up, forgotten) // SETTLING_STEPS))
 
 
 def simulate(case: Case, design: Design, steps: int | None = None,

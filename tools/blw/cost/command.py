@@ -9,7 +9,7 @@ import click
 from tqdm import tqdm
 
 from blw.atomic import write_files
-from blw.cost import cases, contraction, document, measure, targets
+from blw.cost import cases, contraction, document, kernels, measure, targets
 from blw.design import json_text
 from blw.errors import BulwarkError
 from blw.methods import REGISTRY
@@ -54,8 +54,8 @@ def bench(as_json: bool, path: Path | None, **names: Any) -> None:
     rows = list(tqdm(measure.measure(plan), "measuring", len(plan.programs), leave=False,
                      disable=None))
     if path:
-        contracted = contraction.measure(plan, rows)
-        content = document.text(rows, contracted, measure.small(plan), plan.refused)
+        content = document.text(rows, kernels.measure(plan, rows), contraction.measure(plan, rows),
+                                measure.small(plan), plan.refused)
         write_files(path.parent, {path.name: content})
     _print(rows, plan, WORK | SIZES, as_json)
 

@@ -33,7 +33,7 @@ from blw.cost.programs import Program
 TARGET = "m4f"
 REFILL = 2
 DIVISION = {"vdiv": 14, "vsqrt": 14, "sdiv": 12, "udiv": 12}
-TRACE = "-singlestep -d exec,nochain -D"
+TRACE = "-d in_asm,exec,nochain -D"
 
 #: Executed instructions that a trace may have.
 BUDGET = 1_000_000
@@ -71,12 +71,21 @@ class Instruction:
     read: frozenset[str]
 
 
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Instructions that QEMU translated at once and executes from the first to the last."""
+
+    addresses: tuple[int, ...]
+
+
 @dataclass
 class Tally:
-    """Executed instructions, and their modelled cycles."""
+    """Executed instructions, and their modelled cycles; of a function also how often it was come
+    into from another one, which are its calls if it makes none itself."""
 
     instructions: int = 0
     cycles: int = 0
+    entries: int = 0
 
 
 @dataclass
@@ -112,8 +121,8 @@ def follow(program: Program, prepared: Prepared, typical: int) -> Trace:
         path = Path(folder, "trace")
         programs.run(program, shorter, f"{TRACE} {path}")
         with path.open(encoding="ascii", errors="replace") as stream:
-            steps = list(_steps(_addresses(stream), code, owner_step))
-    return _sum(steps[-FOLLOWED:], code)
+            steps = list(_steps(_executed(stream), code, owner_step))
+    return _sum(map(_unfolded, steps[-FOLLOWED:]), code)
 
 
 def disassemble(program: Program) -> dict[int, Instruction]:
@@ -174,29 +183,57 @@ def _listed(operands: str) -> int:
     return count * (2 if "{d" in operands else 1)
 
 
-def _addresses(stream: Iterable[str]) -> Iterator[int]:
-    for line in stream:  # "Trace 0: 0x7f... [flags/pc/...] function"
-        words = line.split("/", 2)
-        if len(words) == 3:
-            yield int(words[1], 16)
+def _executed(stream: Iterable[str]) -> Iterator[Block]:
+    """The blocks of a trace, one after the other; it lists each before it is executed first.
+
+    "IN: function", "0x00000048:  b508  push {r3, lr}" and more such lines, "" and then
+    "Trace 0: 0x7f... [flags/pc/...] function", or later "Stopped" if it did not come to that.
+    """
+    listed: dict[int, Block] = {}
+    latest: Block | None = None
+    addresses: list[int] = []
+    for line in stream:
+        if line.startswith("Trace"):
+            if latest:
+                yield latest
+            latest = listed[int(line.split("/", 2)[1], 16)]
+        elif line.startswith("0x"):
+            addresses.append(int(line.partition(":")[0], 16))
+        elif line.startswith("Stopped"):
+            latest = None
+        elif addresses:
+            listed[addresses[0]] = Block(tuple(addresses))
+            addresses = []
+    if latest:
+        yield latest
 
 
-def _steps(addresses: Iterable[int], code: dict[int, Instruction], step: str,
-           ) -> Iterator[Counter[tuple[int, int]]]:
-    """Per step, how often one instruction followed another; from the first of the step to the one
-    after its return, which is not of the library."""
-    pairs: Counter[tuple[int, int]] | None = None
-    before = 0
+def _steps(blocks: Iterable[Block], code: dict[int, Instruction], step: str,
+           ) -> Iterator[Counter[tuple[Block, Block]]]:
+    """Per step, how often one block followed another; from the first of the step to the one after
+    its return, which is not of the library."""
+    pairs: Counter[tuple[Block, Block]] | None = None
+    before = None
     entry = next(at for at, one in code.items() if one.function == step)
-    for at in addresses:
+    for block in blocks:
+        first = block.addresses[0]
         if pairs is not None:
-            pairs[before, at] += 1
-            if code[at].function in CALLERS:
+            pairs[before, block] += 1
+            if code[first].function in CALLERS:
                 yield pairs
                 pairs = None
-        elif at == entry:
+        elif first == entry:
             pairs = Counter()
-        before = at
+        before = block
+
+
+def _unfolded(blocks: Counter[tuple[Block, Block]]) -> Counter[tuple[int, int]]:
+    """How often one instruction followed another."""
+    pairs: Counter[tuple[int, int]] = Counter()
+    for (block, after), times in blocks.items():
+        for pair in pairwise((*block.addresses, after.addresses[0])):
+            pairs[pair] += times
+    return pairs
 
 
 def _sum(steps: Iterable[Counter[tuple[int, int]]], code: dict[int, Instruction]) -> Trace:
@@ -213,6 +250,8 @@ def _sum(steps: Iterable[Counter[tuple[int, int]]], code: dict[int, Instruction]
         for tally in (trace.total, trace.functions.setdefault(here.function, Tally())):
             tally.instructions += times
             tally.cycles += times * (here.cycles + (REFILL if taken else 0))
+        if there.function not in {here.function, *CALLERS}:
+            trace.functions.setdefault(there.function, Tally()).entries += times
     for function, cycles in stalls.items():
         trace.total.cycles += cycles
         trace.functions[function].cycles += cycles

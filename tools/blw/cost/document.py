@@ -15,8 +15,7 @@ COLUMNS = {"instructions_typical": "typical", "instructions_mean_attacked": "att
 
 HEAD = f"""# What a step costs
 
-Made by `tools/bulwark bench --write docs/cost.md`. The tests measure liu5 again and compare its
-lines; with `BULWARK_EXTENDED=1` they write the whole document again.
+Made by `tools/bulwark bench --write docs/cost.md`; the tests make it again and compare every line.
 
 Executed instructions of one step, from the first of `blw_<method>_step` to its return: the median
 of {BENIGN_STEPS} steps without attack, the mean of 200 attacked steps, the most of all. The logs
@@ -44,6 +43,14 @@ interrupts. All in bytes. The library has no `.data` and no `.bss`.
 """
 
 
+KERNELS_HEAD = """## Kernels
+Of the steps above, one call of what is dense in them: Cortex-M4F, straight-line code for exact
+sizes unless it says loops. The Kalman step and the certificate include their checks.
+
+| model | kernel | | instructions | cycles | per multiply-add |
+|---|---|---|---:|---:|---:|"""
+
+
 CONTRACTION = """## With contraction
 What a compiler would make of the same step if it might contract a product and a sum into one
 rounding (`-ffp-contract=fast`): fewer instructions, but other bits on every target and, since a
@@ -61,9 +68,11 @@ code. The bits are the same. {title}, {model}; `tools/bulwark bench --small` tel
 """
 
 
-def text(rows: Sequence[dict[str, Any]], contracted: Sequence[dict[str, Any]],
-         small: Sequence[dict[str, Any]], refused: Sequence[dict[str, str]]) -> str:
-    """The document.  contracted: as contraction.measure() returns it; small: rows, too."""
+def text(rows: Sequence[dict[str, Any]], calls: Sequence[dict[str, Any]],
+         contracted: Sequence[dict[str, Any]], small: Sequence[dict[str, Any]],
+         refused: Sequence[dict[str, str]]) -> str:
+    """The document.  calls, contracted: as kernels.measure() and contraction.measure() return them;
+    small: rows, too."""
     lines = [HEAD]
     for target in dict.fromkeys(row["target"] for row in rows):
         own = [row for row in rows if row["target"] == target]
@@ -71,6 +80,8 @@ def text(rows: Sequence[dict[str, Any]], contracted: Sequence[dict[str, Any]],
     if small:
         title = TARGETS[small[0]["target"]].title
         lines += [SMALL.format(title=title, model=small[0]["model"]), *table(small)]
+    if calls:
+        lines += [KERNELS_HEAD, *map(_kernel_line, calls), ""]
     if contracted:
         lines += [CONTRACTION, *map(_contracted_line, contracted), ""]
     lines += ["## Refused", *(f"- {one['model']}, `{one['method']}`: {one['reason']}"
@@ -92,6 +103,13 @@ def figure(number: float | None) -> str:
 def _contracted_line(row: dict[str, Any]) -> str:
     figures = " | ".join(map(figure, row["instructions"] + row["cycles"]))
     return f"| `{row['what']}` | {figures} |"
+
+
+def _kernel_line(row: dict[str, Any]) -> str:
+    kernel = row["kernel"]
+    each = f"{row['instructions'] / kernel.terms:.2f}" if kernel.terms else ""
+    figures = " | ".join(figure(row[key]) for key in ("instructions", "cycles"))
+    return f"| {kernel.model} | `{kernel.function}` | {kernel.what} | {figures} | {each} |"
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:

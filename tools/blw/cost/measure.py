@@ -3,8 +3,9 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,7 @@ def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str
          variant: str = "") -> Bench:
     """Design the cases and build the programs of all targets; without methods, of every one that
     accepts the model.  variant: as port/replay/CMakeLists.txt has them, behind a dot."""
-    prepared = {case.name: prepare(case) for case in cases}
+    prepared = _prepared(cases)
     refused = [{"model": name, "method": method, "reason": reason}
                for name, one in prepared.items() for method, reason in one.design.refused.items()
                if not methods or method in methods]
@@ -45,6 +46,15 @@ def plan(cases: Sequence[Case], targets: Sequence[Target], methods: Sequence[str
               if not methods or method in methods]
     programs.build(wanted)
     return Bench(prepared, wanted, refused)
+
+
+def _prepared(cases: Sequence[Case]) -> dict[str, Prepared]:
+    """By name; several cases are designed at the same time."""
+    names = [case.name for case in cases]
+    if len(cases) == 1:
+        return dict(zip(names, map(prepare, cases), strict=True))
+    with ProcessPoolExecutor(os.cpu_count(), get_context("forkserver")) as pool:
+        return dict(zip(names, pool.map(prepare, cases), strict=True))
 
 
 def small(bench: Bench) -> list[dict[str, Any]]:

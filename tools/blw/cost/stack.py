@@ -6,8 +6,7 @@ sum over all of a routine's pushes is an upper bound.  A call through a pointer 
 straight-line kernel of the model that the linker kept, and to any function of the const objects
 <name>_ops in which modules offer themselves to each other; not back to where it comes from, nor to
 what calls that by name, since the library has no recursion, nor to its own file, where calls have
-names.  Recursion and a frame of
-unknown size are errors, not guesses.
+names.  Recursion and a frame of unknown size are errors, not guesses.
 """
 
 import re
