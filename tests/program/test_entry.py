@@ -2,6 +2,7 @@
 """tools/bulwark: dispatch, exit statuses, messages, and what its set-up would install."""
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -12,12 +13,13 @@ from blw.cli import COMMANDS
 from blw.demo import SCENARIO
 
 STUBS = {
-    # One package is installed; a missing one makes dpkg-query say nothing.
-    "dpkg-query": 'case "$*" in *python3-venv*) ;; *) echo installed ;; esac',
+    # A missing package makes dpkg-query say nothing about it.
+    "dpkg-query": "echo installed python3",
     "apt-get": 'echo "apt-get $*" >>"$CALLS"',
     "sudo": 'echo "sudo $*" >>"$CALLS"; exec "$@"',
     "id": "echo 1000",
 }
+ALL_INSTALLED = "echo installed python3; echo installed python3-venv"
 
 
 @pytest.fixture
@@ -41,7 +43,7 @@ def set_up(tmp_path: Path, root: Path):
 
 
 def test_set_up_given_nothing_missing_is_silent(set_up):
-    done, calls = set_up("python", **{"dpkg-query": "echo installed"})
+    done, calls = set_up("python", **{"dpkg-query": ALL_INSTALLED})
     assert (done.returncode, done.stderr, calls) == (0, "", [])
 
 
@@ -118,6 +120,17 @@ def test_doctor_given_json_names_methods_versions_and_what_is_missing(entry):
     assert {"kalman", "lasso"} <= set(told["methods"])
     assert {"bulwark", "python", "numpy", "scipy"} <= set(told["versions"])
     assert isinstance(told["missing"], list)
+
+
+@pytest.mark.skipif("OPENBLAS_CORETYPE" not in os.environ, reason="no processor with AVX2")
+def test_entry_given_other_blas_kernels_designs_the_same_bits(entry, root, tmp_path):
+    for kernels, threads in (("Haswell", "1"), ("Nehalem", "2")):
+        done = entry("design", root / "host_sim/models/random10.toml", "--method", "kalman",
+                     "--out", tmp_path / kernels, env=os.environ | {
+                         "OPENBLAS_CORETYPE": kernels, "OPENBLAS_NUM_THREADS": threads})
+        assert done.returncode == 0, done.stderr
+    for written in (tmp_path / "Haswell").iterdir():
+        assert written.read_bytes() == (tmp_path / "Nehalem" / written.name).read_bytes()
 
 
 def test_ci_runs_the_test_command_and_nothing_else(root):

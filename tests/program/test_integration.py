@@ -24,29 +24,28 @@ def source_list(root, tmp_path):
     return done.stderr.strip().split(";")
 
 
-@pytest.fixture
-def header(bulwark, tmp_path):
+@pytest.fixture(scope="module")
+def header(bulwark, tmp_path_factory):
     """The amalgamation."""
-    path = tmp_path / "include" / "bulwark.h"
+    path = tmp_path_factory.mktemp("include") / "bulwark.h"
     done = bulwark("amalgamate", "--out", path)
     assert done.returncode == 0, done.stderr
     return path
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def library(header):
-    """The one source file that it takes."""
-    path = header.with_name("library.c")
-    path.write_text("#define BLW_IMPLEMENTATION\n#include <bulwark.h>\n")
+    """The one object that it takes."""
+    source, path = header.with_name("library.c"), header.with_name("library.o")
+    source.write_text("#define BLW_IMPLEMENTATION\n#include <bulwark.h>\n")
+    compiled(*COMPILERS["c"], *STRICT, "-I", header.parent, "-c", source, "-o", path)
     return path
 
 
 @pytest.mark.parametrize("language, main", [("c", "main.c"), ("c++", "main.cpp")])
 def test_amalgamation_given_a_consumer_builds_and_runs(root, library, tmp_path, language, main):
-    include = ["-I", library.parent]
-    compiled(*COMPILERS["c"], *STRICT, *include, "-c", library, "-o", tmp_path / "library.o")
     consumer = root / "tests" / "install" / "consumer" / main
-    compiled(*COMPILERS[language], *STRICT, *include, consumer, tmp_path / "library.o", "-lm", "-o",
+    compiled(*COMPILERS[language], *STRICT, "-I", library.parent, consumer, library, "-lm", "-o",
              tmp_path / "consumer")
     assert subprocess.call([tmp_path / "consumer"]) == 0
 
@@ -61,14 +60,12 @@ def test_amalgamation_given_a_generated_model_builds_firmware_from_both(root, li
 
 
 def test_amalgamation_given_every_public_symbol_has_it(root, library, tmp_path):
-    compiled("gcc", "-std=c99", "-ffp-contract=off", "-I", library.parent, "-c", library, "-o",
-             tmp_path / "one.o")
     parts = []
     for source in source_list(root, tmp_path):
         parts.append(tmp_path / (source.rsplit("/", 1)[1] + ".o"))
         compiled("gcc", "-std=c99", "-ffp-contract=off", "-I", root / "lib" / "include", "-c",
                  source, "-o", parts[-1])
-    assert symbols(tmp_path / "one.o") == set().union(*map(symbols, parts))
+    assert symbols(library) == set().union(*map(symbols, parts))
 
 
 def symbols(path):

@@ -3,12 +3,14 @@
 
 import sys
 import xml.etree.ElementTree as xml
+from functools import partial
+from threading import Barrier
 
 import pytest
 
 from blw.build import StepFailed
 from blw.tally import Tally
-from blw.testing import _report, _with_junit
+from blw.testing import ALONE, LANES, _report, _tallies, _with_junit
 
 JUNIT = """<testsuite>
   <testcase name="a"/>
@@ -30,6 +32,27 @@ def test_report_given_step_that_does_not_build_counts_a_failure(capsys):
         raise StepFailed("preset host-f32: it does not build")
     assert _report("host-f32", step) == Tally(failed=1)
     assert "it does not build" in capsys.readouterr().err
+
+
+def test_steps_given_one_that_wants_to_be_alone_run_it_when_the_others_have_ended():
+    running, most, seen = [], [], []
+    meeting = Barrier(LANES, timeout=60)
+
+    def step(name: str) -> Tally:
+        running.append(name)
+        if name not in ALONE:
+            meeting.wait()  # so many run at the same time, or none gets past
+        most.append(len(running))
+        seen.append(name)
+        running.remove(name)
+        return Tally(passed=1)
+
+    names = [*ALONE, *(f"step{i}" for i in range(2 * LANES))]
+    tallies = list(_tallies({name: partial(step, name) for name in names}))
+    assert sum(tallies, Tally()) == Tally(passed=len(names))
+    assert sorted(seen) == sorted(names)
+    assert seen[-len(ALONE):] == list(ALONE)
+    assert most[-1] == 1
 
 
 @pytest.mark.parametrize("script, tally", [

@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build"
+PRESETS = ROOT / "CMakePresets.json"
 PRECISIONS = ("f32", "f64")
 
 _STATUS = re.compile(r"^\[(\d+)/(\d+)\]")
@@ -63,10 +64,7 @@ def arguments(options: dict[str, Any]) -> list[str]:
 
 def _program(name: str, precision: str) -> Path:
     preset = f"host-{precision}"
-    with _turn(preset):
-        if not (BUILD / preset / "build.ninja").is_file():
-            _configure(preset, tests=False)
-        _make(preset, name)
+    build_programs(preset, [name])
     return BUILD / preset / "host_sim" / name
 
 
@@ -87,7 +85,8 @@ def build_programs(preset: str, targets: Sequence[str]) -> None:
     Raises StepFailed.
     """
     with _turn(preset):
-        _configure(preset, tests=_has_tests(preset))
+        if not _is_configured(preset):
+            _configure(preset, tests=_has_tests(preset))
         _make(preset, *targets)
 
 
@@ -110,6 +109,12 @@ def _turn(preset: str) -> Iterator[None]:
     with (BUILD / f".{preset}.lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         yield
+
+
+def _is_configured(preset: str) -> bool:
+    """As CMakePresets.json tells; whatever else changed, ninja configures it again itself."""
+    made = BUILD / preset / "build.ninja"
+    return made.is_file() and made.stat().st_mtime > PRESETS.stat().st_mtime
 
 
 def _has_tests(preset: str) -> bool:

@@ -23,14 +23,13 @@ as_root() {
 
 # packages_missing GROUP...: those packages of the groups that are not installed.
 packages_missing() {
-    for group in "$@"; do
+    wanted=$(for group in "$@"; do
         sed -n "s/^$group  *//p" "$root/tools/setup/packages"
-    done | while read -r package; do
-        case $(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null) in
-            installed) ;;
-            *) echo "$package" ;;
-        esac
-    done
+    done)
+    # shellcheck disable=SC2086 # a list of names
+    installed=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $wanted 2>/dev/null |
+        sed -n 's/^installed //p')
+    echo "$wanted" | grep -vxF -e "$installed" || :
 }
 
 # ensure_packages GROUP...: install what is missing in one go.  On other systems than Debian the
