@@ -135,13 +135,14 @@ def attack_of(name, model, steps):
     return added
 
 
-def near(measured, windows):
-    return measured == pytest.approx(windows.mean(), abs=max(0.1 * measured, 2.0 * windows.std()))
+def near(measured, simulated, spread):
+    return measured == pytest.approx(simulated, abs=max(0.1 * measured, 2.0 * spread))
 
 
 def test_simulated_work_given_the_documented_steps_is_within_a_tenth_of_their_instructions(root):
-    """A figure of the document is that of one window of 50 or 200 steps; where windows differ by
-    more than that among themselves, it has to be within two of their standard deviations."""
+    """A figure of the document is that of one window, of 50 steps without attack or of the first
+    200 of an attack, which slow local filters take to follow; where windows differ by more than
+    that among themselves, it has to be within two of their standard deviations."""
     rows = [row for row in documented(root) if row[1] in l1_instructions.METHODS]
     for name, method, typical, attacked in rows:
         design = designed(name)
@@ -151,9 +152,9 @@ def test_simulated_work_given_the_documented_steps_is_within_a_tenth_of_their_in
         benign, under = (l1_instructions.instructions(work, N, prices)
                          for work in l1_work.count(design, method, attack))
         windows = np.median(benign.reshape(-1, cases.BENIGN_STEPS), axis=1)
-        assert near(typical, windows), (name, method, windows.mean())
+        assert near(typical, windows.mean(), windows.std()), (name, method, windows.mean())
         windows = under.reshape(-1, cases.ATTACKED_STEPS).mean(axis=1)
-        assert near(attacked, windows), (name, method, windows.mean())
+        assert near(attacked, windows[0], windows[1:].std()), (name, method, windows[0])
     assert len(rows) == 9
 
 
