@@ -53,7 +53,9 @@ class Bus:
             command += ["--design", self.design]
         process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE,
                                    stderr=subprocess.STDOUT, text=True)
-        process.said = process.stdout.readline()
+        said = process.stdout.readline()
+        if said.startswith("blw_bus: "):
+            raise SystemExit(said)
         return process
 
     def node(self, name: str, *arguments: object, methods: str = "kalman,guard",
