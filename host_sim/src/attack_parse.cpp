@@ -76,6 +76,32 @@ void set_value(AttackSpec &spec, const std::vector<double> &value, const std::st
     }
 }
 
+/* A key that does nothing is a mistake: the attack would not be the one that was meant. */
+void check_meaning(const TomlTable &table, AttackKind kind)
+{
+    const struct {
+        const char             *key;
+        std::vector<AttackKind> kinds;
+    } uses[] = {
+        {"probability", {AttackKind::drop}},
+        {"state", {AttackKind::ghost}},
+        {"period_s", {AttackKind::sine, AttackKind::pulse}},
+        {"width_s", {AttackKind::pulse}},
+        {"phase_rad", {AttackKind::sine}},
+        {"seed", {AttackKind::white, AttackKind::uniform, AttackKind::drop}},
+    };
+    for (const auto &use : uses) {
+        if (table.has(use.key)
+            && (std::find(use.kinds.begin(), use.kinds.end(), kind) == use.kinds.end())) {
+            std::vector<std::string> names;
+            for (const AttackKind known : use.kinds) {
+                names.emplace_back(kind_name(known));
+            }
+            table.fail(use.key, "has a meaning for kind " + join(names, ", ") + " only");
+        }
+    }
+}
+
 void check_waves(const AttackSpec &spec, const std::string &where)
 {
     const bool repeats = (spec.kind == AttackKind::sine) || (spec.kind == AttackKind::pulse);
@@ -121,21 +147,22 @@ void parse_value(const TomlTable &table, AttackSpec &spec)
     if (needs_value(spec.kind) != table.has("value")) {
         table.fail("value", table.has("value") ? "has no meaning for this kind" : "missing");
     }
-    if (table.has("probability") && (spec.kind != AttackKind::drop)) {
-        table.fail("probability", "has a meaning for kind drop only");
-    }
     if (needs_value(spec.kind)) {
         set_value(spec, *table.numbers("value"), table.where("value"));
-    } else {
-        spec.value.assign(spec.sensors.size(), table.number("probability").value_or(1.0));
+        return;
     }
+    const double probability = table.number("probability").value_or(1.0);
+    if (!(probability >= 0.0) || !(probability <= 1.0)) {
+        table.fail("probability", "must be from 0 to 1");
+    }
+    spec.value.assign(spec.sensors.size(), probability);
 }
 
 void parse_state(const TomlTable &table, const Design &design, AttackSpec &spec)
 {
     const std::optional<std::vector<double>> state = table.numbers("state");
     if ((spec.kind == AttackKind::ghost) != state.has_value()) {
-        table.fail("state", state ? "has a meaning for kind ghost only" : "missing");
+        table.fail("state", "missing");
     }
     if (state && (state->size() != design.n)) {
         table.fail("state", "expected " + std::to_string(design.n) + " numbers");
@@ -154,6 +181,7 @@ AttackSpec parse_attack(const TomlTable &table, const Design &design)
     }
     spec.id   = table.text("id").value_or("");
     spec.kind = find_kind(*table.text("kind"), table.where("kind"));
+    check_meaning(table, spec.kind);
     spec.seed = table.integer("seed");
     parse_sensors(table, design, spec);
     parse_window(table, spec);

@@ -24,6 +24,20 @@ Wave::Shape parse_shape(const TomlTable &table)
     table.fail("shape", "expected \"constant\", \"sine\" or \"pulse\"");
 }
 
+/* A key that does nothing is a mistake: the input would not be the one that was meant. */
+void check_meaning(const TomlTable &table, Wave::Shape shape)
+{
+    if (table.has("period_s") && (shape == Wave::Shape::constant)) {
+        table.fail("period_s", "has a meaning for shape sine, pulse only");
+    }
+    if (table.has("width_s") && (shape != Wave::Shape::pulse)) {
+        table.fail("width_s", "has a meaning for shape pulse only");
+    }
+    if (table.has("phase_rad") && (shape != Wave::Shape::sine)) {
+        table.fail("phase_rad", "has a meaning for shape sine only");
+    }
+}
+
 Wave parse_wave(const TomlTable &table, const Design &design)
 {
     Wave wave;
@@ -39,6 +53,10 @@ Wave parse_wave(const TomlTable &table, const Design &design)
     if ((wave.shape != Wave::Shape::constant) && !(wave.period_s > 0.0)) {
         table.fail("period_s", "must be given and positive");
     }
+    if ((wave.shape == Wave::Shape::pulse) && !(wave.width_s > 0.0)) {
+        table.fail("width_s", "must be given and positive");
+    }
+    check_meaning(table, wave.shape);
     return wave;
 }
 

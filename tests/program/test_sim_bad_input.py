@@ -81,6 +81,9 @@ def test_replay_given_bad_map_says_where(case, tmp_path, name):
 
 
 BIAS = '[[attack]]\nsensor = "a"\nkind = "bias"\nvalue = 1.0\n'
+WAVE = ('steps = 3\n[controller]\nkind = "wave"\n[[controller.wave]]\n'
+        'input = "force_N"\nvalue = 1.0\n')
+
 SCENARIOS = {
     "no toml": ("steps = = 3", "scenario.toml:2:"),
     "no steps": ("", "scenario.toml:1:1: steps: missing"),
@@ -107,6 +110,26 @@ SCENARIOS = {
     "window": ("steps = 3\n" + BIAS + "from = 2\nto = 2", "to: the attack ends before it begins"),
     "both windows": ("steps = 3\n" + BIAS + "from = 2\nt0_s = 2.0", "not both"),
     "period": ("steps = 3\n" + BIAS.replace("bias", "sine"), "period_s: must be given"),
+    "period of a bias": ("steps = 3\n" + BIAS + "period_s = 1.0",
+                         "period_s: has a meaning for kind sine, pulse only"),
+    "width of a bias": ("steps = 3\n" + BIAS + "width_s = 1.0",
+                        "width_s: has a meaning for kind pulse only"),
+    "phase of a bias": ("steps = 3\n" + BIAS + "phase_rad = 1.0",
+                        "phase_rad: has a meaning for kind sine only"),
+    "seed of a bias": ("steps = 3\n" + BIAS + "seed = 1",
+                       "seed: has a meaning for kind white, uniform, drop only"),
+    "state of a bias": ("steps = 3\n" + BIAS + "state = [1.0, 1.0]",
+                        "state: has a meaning for kind ghost only"),
+    "probability of a bias": ("steps = 3\n" + BIAS + "probability = 0.5",
+                              "probability: has a meaning for kind drop only"),
+    "probability": ('steps = 3\n[[attack]]\nsensor = "a"\nkind = "drop"\nprobability = 1.5',
+                    "probability: must be from 0 to 1"),
+    "period of a constant": (WAVE + "period_s = 1.0", "period_s: has a meaning for shape sine"),
+    "phase of a pulse": (WAVE + 'shape = "pulse"\nperiod_s = 1.0\nwidth_s = 0.5\nphase_rad = 1.0',
+                         "phase_rad: has a meaning for shape sine only"),
+    "width of a sine": (WAVE + 'shape = "sine"\nperiod_s = 1.0\nwidth_s = 0.5',
+                        "width_s: has a meaning for shape pulse only"),
+    "no width": (WAVE + 'shape = "pulse"\nperiod_s = 1.0', "width_s: must be given and positive"),
     "ghost": ('steps = 3\n[[attack]]\nsensor = "a"\nkind = "ghost"\nstate = [1.0]',
               "state: expected 2 numbers"),
 }
