@@ -206,7 +206,7 @@ def test_design_given_a_model_states_the_sizes_of_its_memory():
 
 
 def test_design_given_gamma_and_probability_refuses():
-    with pytest.raises(ModelError, match="paper0: method.lasso: give gamma or recovery_prob"):
+    with pytest.raises(ModelError, match="^method.lasso: give gamma or recovery_prob"):
         design("paper0", gamma=1.0, recovery_probability=0.9)
     with pytest.raises(ModelError, match="recovery_probability or benign_loss, not both"):
         design("paper0", benign_loss=0.1, recovery_probability=0.9)

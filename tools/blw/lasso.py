@@ -121,8 +121,7 @@ def check_options(options: Any, model: Model, name: str) -> None:
     """Refuse options that contradict each other."""
     given = [key for key in GAMMA_KEYS if getattr(options, key) is not None]
     if len(given) > 1:
-        where = model.path or model.name
-        raise ModelError(f"{where}: method.{name}: give {' or '.join(given)}, not both")
+        raise ModelError(f"method.{name}: give {' or '.join(given)}, not both")
 
 
 def spans(filters: LocalFilters, sensors: int) -> list[slice]:
