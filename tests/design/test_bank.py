@@ -275,6 +275,7 @@ ROWS = [[1, 0], [1, 1], [2, -1], [1, -1]]
     ([[1, 0], [0, 1], [0, 2], [1, 1]], 1, {}, "{y2, y3} alone cannot see the mode 0.9"),
     (ROWS, 1, {"theta": 1, "horizon": 1}, "shorter than the observability index 2 of {y1}"),
     (ROWS, 1, {"grouped": True}, "grouped needs a window"),
+    (ROWS, 1, {"window": 100, "memory": 50}, 'memory needs window = "ewma"'),
     (ROWS, 1, {"grouped": True, "window": 100}, "not a multiple of the 6 groups"),
 ])
 def test_design_refuses_what_it_cannot_serve(C, p, options, message):

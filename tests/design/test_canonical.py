@@ -124,6 +124,7 @@ def test_printed_variant_has_weights_one_and_says_that_it_is_ambiguous():
     ({"weights": [1.0, -1.1, 1.2, 1.3]}, "weights: must be positive"),
     ({"weights": [1.0, 1.1, 1.2, 2.0]}, "must be less than (p + 1) / p = 2"),
     ({"weights": [1.0, 1.1, 1.2, 1.3], "variant": "printed"}, "has all weights 1"),
+    ({"coordinates": "steady", "variant": "printed"}, "has Jordan coordinates"),
     ({"gamma": 1.0, "recovery_probability": 0.9}, "method.canonical: give gamma or"),
 ])
 def test_options_that_do_not_fit_are_refused(given, message):

@@ -156,6 +156,8 @@ def _check(model: Model, options: Options) -> int:
                           "without attack need not exist")
     if options.grouped and options.window == "ewma":
         raise DesignError('grouped needs a window; window = "ewma" averages over all blocks')
+    if options.memory != Options.memory and options.window != "ewma":
+        raise DesignError('memory needs window = "ewma"; a window is its own memory')
     return theta
 
 

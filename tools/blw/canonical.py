@@ -81,6 +81,9 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
 
 def _coordinates(model: Model, options: Options) -> Choice:
     if options.variant == "printed":
+        if options.coordinates not in ("auto", "jordan"):
+            raise ModelError(f"method.{NAME}.coordinates: variant \"printed\" has Jordan "
+                             "coordinates")
         return "jordan"
     if options.coordinates == "auto" and np.any(model.rate < 1.0):
         return "steady"
