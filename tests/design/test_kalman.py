@@ -131,6 +131,18 @@ def test_steady_state_given_R_not_positive_definite_refuses(R, message):
         kalman.steady_state([[0.5]], [[1.0], [1.0]], [[1.0]], R)
 
 
+@pytest.mark.parametrize(("A", "message"), [
+    ([[1e30, 0.0], [0.0, 0.5]], r"a mode that grows 1e\+30 times in a step, at most 6.7e\+07"),
+    ([[0.9, 1e30], [0.01, 0.985]], r"a mode that grows 1e\+14 times in a step"),
+    ([[0.9, 1e30], [0.0, 0.985]], r"the entries of A reach from 0.9 to 1e\+30: choose units"),
+])
+def test_steady_state_given_A_beyond_double_precision_refuses(recwarn, A, message):
+    C = [[1.0, 0.0], [0.9, 0.1], [0.0, 1.0]]
+    with pytest.raises(DesignError, match=message):
+        kalman.steady_state(A, C, 0.01 * np.eye(2), 0.1 * np.eye(3))
+    assert not recwarn.list
+
+
 def test_steady_state_given_indefinite_W_refuses():
     with pytest.raises(DesignError, match="B Q B' is not positive semidefinite"):
         kalman.steady_state(np.eye(2) / 2, np.eye(2), np.diag([1.0, -1.0]), np.eye(2))

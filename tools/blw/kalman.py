@@ -32,6 +32,7 @@ POLISH_STEPS = 20      # Riccati steps at most
 DOUBLINGS = 60         # of the Riccati recursion at most
 SEMIDEFINITE = 1e-9    # negative eigenvalue of a correlation matrix that is taken for rounding
 ROUNDING = 1e-14       # relative eigenvalue of a correlation matrix that is taken for rounding
+GROWTH_MAX = 6.7e7     # of a mode in a step: beyond 1/sqrt(eps) of double, I - K C is rounding
 CONDITION_MAX = 1e14   # of the correlation matrix of R
 
 Array = NDArray[np.float64]
@@ -56,15 +57,24 @@ def steady_state(A: Array, C: Array, W: Array, R: Array) -> Kalman:
     """The stabilising solution of the Riccati equation, polished by Riccati steps.
 
     A [n, n], C [m, n], W = B Q B' [n, n] positive semidefinite, R [m, m] positive definite.
-    Raises DesignError naming the mode that no sensor sees or no noise moves, or the sensor whose
-    noise is not positive.
+    Raises DesignError naming the mode that no sensor sees or no noise moves, the sensor whose
+    noise is not positive, or the entries that are too far apart for double precision.
     """
     A, C, W, R = (np.asarray(matrix, dtype=float) for matrix in (A, C, W, R))
     _check_R(R)
-    _check_modes(A, C, "no sensor sees the mode", "it is not detectable")
-    _check_modes(A.T, _root(W), "no noise reaches the mode",
-                 "it is not stabilisable; give B Q B' a part in it")
-    return _checked(_polish(A, C, W, R, _stabilising(A, C, W, R)))
+    _check_growth(A)
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            _check_modes(A, C, "no sensor sees the mode", "it is not detectable")
+            _check_modes(A.T, _root(W), "no noise reaches the mode",
+                         "it is not stabilisable; give B Q B' a part in it")
+            return _checked(_polish(A, C, W, R, _stabilising(A, C, W, R)))
+    except (np.linalg.LinAlgError, ValueError):  # ValueError: of scipy, for what is not finite
+        sizes = np.abs(A[A != 0.0])
+        reach = f"from {sizes.min():.3g} to {sizes.max():.3g}" if sizes.size else "nowhere"
+        raise DesignError("the Riccati equation cannot be solved in double precision; the entries "
+                          f"of A reach {reach}: choose units that bring them closer "
+                          "together") from None
 
 
 def _stabilising(A: Array, C: Array, W: Array, R: Array) -> Array:
@@ -159,6 +169,14 @@ def design(model: Model, kalman: Kalman, options: Options) -> Designed:
         "cond_S": float(np.linalg.cond(S)),
     }
     return Designed(tables, info, mem=(model.n, model.m), extras=(chi2.detector(S),))
+
+
+def _check_growth(A: Array) -> None:
+    radius = np.abs(np.linalg.eigvals(A)).max()
+    if not radius <= GROWTH_MAX:
+        raise DesignError(f"A has a mode that grows {radius:.3g} times in a step, at most "
+                          f"{GROWTH_MAX:g} can be estimated in double precision; check its units "
+                          "and dt_s")
 
 
 def _check_R(R: Array) -> None:
