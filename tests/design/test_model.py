@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import solve_continuous_lyapunov
 
 from blw import model as model_module
 from blw.errors import ModelError
@@ -195,6 +196,21 @@ def test_parse_given_malformed_model_says_what_and_where(path, value, message):
     assert message in str(caught.value)
     assert str(caught.value).startswith("cart.toml: ")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("dt_s", [0.02, 0.05, 0.1, 10.0])
+def test_discretise_given_fast_decay_keeps_the_noise(dt_s):
+    A, Q = np.array([[-1e3, 1e2], [-1.0, -1.0]]), np.eye(2)
+    Ad, _, _, Qd = model_module.discretise(A, np.zeros((2, 0)), np.eye(2), Q, dt_s)
+    steady = solve_continuous_lyapunov(A, -Q)  # also of the discrete plant
+    np.testing.assert_allclose(Qd, steady - Ad @ steady @ Ad.T, rtol=1e-9)
+
+
+def test_parse_given_growth_beyond_a_double_over_dt_names_A():
+    mapping = changed("plant.continuous", True)
+    mapping["plant"]["A"] = [[1e30, 0.0], [0.0, 1.0]]
+    with pytest.raises(ModelError, match="plant.A discretised over dt_s = 0.5 s is beyond"):
+        model_module.parse(mapping, "cart.toml")
 
 
 def test_load_given_deeply_nested_list_refuses_it(tmp_path):

@@ -26,6 +26,8 @@ METHOD_NAMES = ("kalman", "lasso", "canonical", "joint", "decentral", "bank", "g
 MAX_SENSORS = 64
 MAX_SIZE = 255
 SYMMETRY = 1e-9
+#: |A| dt up to which exp(-A dt) costs Q no more than three digits.
+LOAN_SIZE = 4.0
 #: A sensor that sends more rarely has to be modelled on slower steps.
 MIN_RATE = 0.01
 #: Samples that have to fail to come before a sensor counts as silent.
@@ -147,7 +149,11 @@ def _dynamics(plant: Reader, dt_s: float) -> dict[str, Any]:
             plant.fail(key, f"is too large: {size}, at most {limit} are supported")
     Q = covariance(plant, "Q", B.shape[1])
     if plant.boolean("continuous"):
-        A, Bu, B, Q = discretise(A, Bu, B, Q, dt_s)
+        with np.errstate(over="ignore", invalid="ignore"):
+            A, Bu, B, Q = discretise(A, Bu, B, Q, dt_s)
+        if not all(np.isfinite(matrix).all() for matrix in (A, Bu, Q)):
+            plant.fail("A", f"discretised over dt_s = {dt_s:g} s is beyond double precision; "
+                            "check its units and dt_s")
     return {"n": n, "m": len(C), "l": Bu.shape[1], "A": A, "Bu": Bu, "B": B, "C": C, "Q": Q,
             "x0": plant.vector("x0", n, default=np.zeros(n)),
             "P0": covariance(plant, "P0", n) if plant.has("P0") else None}
@@ -157,14 +163,21 @@ def discretise(A: Array, Bu: Array, B: Array, Q: Array,
                dt_s: float) -> tuple[Array, Array, Array, Array]:
     """Discrete A, Bu (zero-order hold), B = I and Q (from a density) over dt_s.
 
-    C. F. Van Loan, "Computing integrals involving the matrix exponential", IEEE TAC 1978.
+    C. F. Van Loan, "Computing integrals involving the matrix exponential", IEEE TAC 1978.  His Q
+    comes from exp(-A dt), which swamps it where A decays fast; there from a part of dt, by
+    Q(2 t) = Q(t) + A(t) Q(t) A(t)'.
     """
     n, inputs = Bu.shape
     hold = expm(np.block([[A, Bu], [np.zeros((inputs, n + inputs))]]) * dt_s)
-    loan = expm(np.block([[-A, B @ Q @ B.T], [np.zeros((n, n)), A.T]]) * dt_s)
-    Ad = hold[:n, :n]
+    size = np.linalg.norm(A, 1) * dt_s
+    halvings = max(0, int(np.ceil(np.log2(size / LOAN_SIZE)))) if size > 0.0 else 0
+    part = dt_s / 2.0**halvings
+    loan = expm(np.block([[-A, B @ Q @ B.T], [np.zeros((n, n)), A.T]]) * part)
     Qd = loan[n:, n:].T @ loan[:n, n:]
-    return Ad, hold[:n, n:], np.eye(n), (Qd + Qd.T) / 2
+    for k in range(halvings):
+        step = expm(A * (part * 2.0**k))
+        Qd = Qd + step @ Qd @ step.T
+    return hold[:n, :n], hold[:n, n:], np.eye(n), (Qd + Qd.T) / 2
 
 
 def covariance(reader: Reader, key: str, size: int, definite: bool = False,
