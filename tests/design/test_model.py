@@ -213,6 +213,11 @@ def test_parse_given_growth_beyond_a_double_over_dt_names_A():
         model_module.parse(mapping, "cart.toml")
 
 
+def test_parse_given_a_method_that_is_not_there_refuses_it():
+    with pytest.raises(ModelError, match="method: unknown key 'sentry'; known: kalman, lasso"):
+        model_module.parse(changed("method.sentry", {}), "cart.toml")
+
+
 def test_load_given_deeply_nested_list_refuses_it(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text("A = " + "[" * 100000)

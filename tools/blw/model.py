@@ -22,7 +22,7 @@ from blw.errors import ModelError
 from blw.options import check_keys
 from blw.reader import Reader
 
-METHOD_NAMES = ("kalman", "lasso", "canonical", "joint", "decentral", "bank", "guard", "sentry")
+METHOD_NAMES = ("kalman", "lasso", "canonical", "joint", "decentral", "bank", "guard")
 MAX_SENSORS = 64
 MAX_SIZE = 255
 SYMMETRY = 1e-9

@@ -16,7 +16,7 @@ from blw.report.csv_file import CsvFile
 from blw.report.series import Array, runs
 
 METHODS = (
-    "oracle", "kalman", "lasso", "canonical", "joint", "decentral", "bank", "guard", "sentry"
+    "oracle", "kalman", "lasso", "canonical", "joint", "decentral", "bank", "guard"
 )
 """The order in which methods appear everywhere; others follow by name."""
 
