@@ -88,7 +88,6 @@ void check_meaning(const TomlTable &table, AttackKind kind)
         {"period_s", {AttackKind::sine, AttackKind::pulse}},
         {"width_s", {AttackKind::pulse}},
         {"phase_rad", {AttackKind::sine}},
-        {"seed", {AttackKind::white, AttackKind::uniform, AttackKind::drop}},
     };
     for (const auto &use : uses) {
         if (table.has(use.key)

@@ -116,8 +116,6 @@ SCENARIOS = {
                         "width_s: has a meaning for kind pulse only"),
     "phase of a bias": ("steps = 3\n" + BIAS + "phase_rad = 1.0",
                         "phase_rad: has a meaning for kind sine only"),
-    "seed of a bias": ("steps = 3\n" + BIAS + "seed = 1",
-                       "seed: has a meaning for kind white, uniform, drop only"),
     "state of a bias": ("steps = 3\n" + BIAS + "state = [1.0, 1.0]",
                         "state: has a meaning for kind ghost only"),
     "probability of a bias": ("steps = 3\n" + BIAS + "probability = 0.5",
