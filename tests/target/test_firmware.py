@@ -29,14 +29,15 @@ def design():
     return design_all(load(ROOT / "host_sim" / "models" / "pendulum.toml"), ["kalman", METHOD])
 
 
-def simulate(design, steps, out):
+def simulate(design, steps, out, **attack):
     """An attacked run of so many steps, in one process."""
+    attack = attack or {"kind": "uniform", "value": 1.5}
     scenario = out / "scenario.toml"
     scenario.write_text(tomli_w.dumps({
         "model": str(ROOT / "host_sim" / "models" / "pendulum.toml"), "steps": steps,
         "controller": {"kind": "feedback", "method": "truth",
                        "gain": [[-0.604, -1.678, -39.514, -9.721]]},
-        "attack": [{"sensor": "angle", "kind": "uniform", "value": 1.5, "from": steps // 5}]}))
+        "attack": [{"sensor": "angle", "from": steps // 5, **attack}]}))
     tables = out / "design.json"
     tables.write_text(json_text(document(design)))
     subprocess.run([simulator("f32"), "run", scenario, "--design", tables, "--out", out,
@@ -50,6 +51,12 @@ def test_node_given_attacked_frames_answers_all_with_the_bits_of_the_host(design
     assert (outcome.steps, outcome.sent, outcome.received) == (STEPS, 6 * STEPS, 4 * STEPS)
     assert outcome.sent + outcome.received == 10 * STEPS
     assert json.loads((tmp_path / "pil.json").read_text())["steps"] == STEPS
+
+
+def test_node_given_missing_samples_answers_all_with_the_bits_of_the_host(design, tmp_path):
+    simulate(design, 60, tmp_path, kind="drop", probability=0.7, to=59)
+    outcome = pil.check(design, METHOD, tmp_path)
+    assert (outcome.steps, outcome.lost, outcome.different) == (60, 0, 0)
 
 
 def test_run_given_the_transport_pil_runs_the_scenario_and_the_firmware(tmp_path):

@@ -26,7 +26,7 @@ FOLDER = BUILD / "pil"
 REPORT = "pil.json"
 MAX_ITERATIONS = 255
 
-#: The host may be busy with other things; only a step with missing samples waits so long.
+#: The host may be busy with other things; only a last step with missing samples waits so long.
 DEADLINE_US = 2_000_000
 
 #: The estimate [n] as bytes of float32, and the solver's iterations.

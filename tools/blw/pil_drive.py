@@ -16,12 +16,15 @@ import struct
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Protocol
 
 Frame = tuple[int, bytes]
 
+MEASUREMENTS = range(0x100, 0x140)
 STATUS = 0x280
+FLAGS_BYTE = 6
 PATIENCE_S = 5.0
 CHUNK = 65536
 
@@ -96,10 +99,23 @@ def open_line(place: str) -> Line:
 
 def drive(line: Line, steps: Iterable[list[Frame]]) -> Iterator[list[Frame]]:
     """Send the frames of every step; yield those that came back up to the step's status and the
-    sensors after it, or [] if they did not."""
-    for frames in steps:
-        line.send(frames)
+    sensors after it, or [] if they did not.
+
+    A node waits for a sample that is missing until its deadline, or until the next sync: that is
+    sent at once, and the rest of its step after the answer.
+    """
+    sent = 0  # frames of this step that went ahead
+    for frames, following in pairwise(chain(steps, [[]])):
+        line.send(frames[sent:])
+        sent = 1 if following and any(map(_is_missing, frames)) else 0
+        line.send(following[:sent])
         yield _answer(line)
+
+
+def _is_missing(frame: Frame) -> bool:
+    """A measurement that says that there is no sample."""
+    identifier, data = frame
+    return identifier in MEASUREMENTS and not data[FLAGS_BYTE] & 1
 
 
 def _answer(line: Line) -> list[Frame]:
